@@ -1,0 +1,128 @@
+//! A tile of blue noise by void and cluster (Ulichney 1993): thresholds whose errors the eye forgives.
+
+/// Width and height of the tile; a power of two, so that it wraps by masking.
+pub const SIZE: usize = 64;
+
+/// Standard deviation of the energy of a point in pixels (Ulichney recommends 1.5).
+const SIGMA: f32 = 1.5;
+/// Beyond this many pixels the energy, exp(-18), no longer changes an f32 sum.
+const REACH: isize = 9;
+
+struct Energy {
+    kernel: Vec<(isize, isize, f32)>,
+    field: Vec<f32>,
+    on: Vec<bool>,
+}
+
+impl Energy {
+    fn new() -> Self {
+        let mut kernel = Vec::new();
+        for y in -REACH..=REACH {
+            for x in -REACH..=REACH {
+                kernel.push((x, y, (-((x * x + y * y) as f32) / (2.0 * SIGMA * SIGMA)).exp()));
+            }
+        }
+        Self { kernel, field: vec![0.0; SIZE * SIZE], on: vec![false; SIZE * SIZE] }
+    }
+
+    /// Sets or clears a point and updates the energy around it.
+    fn set(&mut self, point: usize, on: bool) {
+        self.on[point] = on;
+        let sign = if on { 1.0 } else { -1.0 };
+        let (x, y) = ((point % SIZE) as isize, (point / SIZE) as isize);
+        for &(dx, dy, energy) in &self.kernel {
+            let at = ((y + dy).rem_euclid(SIZE as isize) * SIZE as isize + (x + dx).rem_euclid(SIZE as isize)) as usize;
+            self.field[at] += sign * energy;
+        }
+    }
+
+    /// The set point with the most energy around it.
+    fn cluster(&self) -> usize {
+        self.extreme(true, |a, b| a > b)
+    }
+
+    /// The empty point with the least energy around it.
+    fn void(&self) -> usize {
+        self.extreme(false, |a, b| a < b)
+    }
+
+    fn extreme(&self, on: bool, better: impl Fn(f32, f32) -> bool) -> usize {
+        let candidates = (0..SIZE * SIZE).filter(|&i| self.on[i] == on);
+        candidates
+            .reduce(|best, i| if better(self.field[i], self.field[best]) { i } else { best })
+            .expect("there are points of both kinds")
+    }
+}
+
+/// The rank of each point divided by their number, row by row: every value from 0 to 1 once.
+pub fn tile() -> Vec<f32> {
+    let mut energy = Energy::new();
+    // A tenth of the points at pseudo-random places (a Weyl sequence), then relaxed until nothing moves.
+    let count = SIZE * SIZE / 10;
+    let mut state = 0u32;
+    while energy.on.iter().filter(|on| **on).count() < count {
+        state = state.wrapping_add(2_654_435_769);
+        let mixed = (state ^ (state >> 15)).wrapping_mul(0x2c1b_3c6d);
+        let point = (mixed ^ (mixed >> 12)) as usize % (SIZE * SIZE);
+        if !energy.on[point] {
+            energy.set(point, true);
+        }
+    }
+    loop {
+        let from = energy.cluster();
+        energy.set(from, false);
+        let to = energy.void();
+        energy.set(to, true);
+        if to == from {
+            break;
+        }
+    }
+    let start = energy.on.clone();
+
+    let mut rank = vec![0usize; SIZE * SIZE];
+    // Down: take clusters away.
+    for r in (0..count).rev() {
+        let point = energy.cluster();
+        energy.set(point, false);
+        rank[point] = r;
+    }
+    // Up: fill voids, to the end. (Ulichney turns to the clusters of empty points halfway; with a Gaussian of one width
+    // the emptiest place is the same one.)
+    for (point, on) in start.iter().enumerate() {
+        if *on {
+            energy.set(point, true);
+        }
+    }
+    for r in count..SIZE * SIZE {
+        let point = energy.void();
+        energy.set(point, true);
+        rank[point] = r;
+    }
+    rank.iter().map(|r| *r as f32 / (SIZE * SIZE) as f32).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_rank_comes_once() {
+        let mut ranks: Vec<_> = tile().iter().map(|v| (v * (SIZE * SIZE) as f32) as usize).collect();
+        ranks.sort_unstable();
+        assert!(ranks.iter().enumerate().all(|(i, r)| i == *r));
+    }
+
+    #[test]
+    fn low_frequencies_are_missing() {
+        // Blue: means of 8 x 8 blocks differ far less than white noise's would (0.289 / 8 = 0.036).
+        let tile = tile();
+        let mut sum = 0.0;
+        for block in 0..64 {
+            let (bx, by) = (8 * (block % 8), 8 * (block / 8));
+            let mean = (0..64).map(|i| tile[(by + i / 8) * SIZE + bx + i % 8]).sum::<f32>() / 64.0;
+            sum += (mean - 0.5) * (mean - 0.5);
+        }
+        let deviation = (sum / 64.0).sqrt();
+        assert!(deviation < 0.01, "block means deviate by {deviation}");
+    }
+}

@@ -1,0 +1,75 @@
+//! From scene-linear Rec. 709 radiance to sRGB pixels: the only place where anything is clipped or gamma-encoded.
+
+use crate::error::{Error, Result};
+
+/// The tone maps by name.
+pub const TONE_MAPS: [&str; 3] = ["agx", "aces", "none"];
+
+type Rgb = [f32; 3];
+
+fn transform(m: &[[f32; 3]; 3], v: Rgb) -> Rgb {
+    m.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2])
+}
+
+/// The sRGB transfer function (IEC 61966-2-1).
+fn encode_srgb(v: f32) -> f32 {
+    let v = v.clamp(0.0, 1.0);
+    if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 }
+}
+
+/// AgX (Troy Sobotka), in the polynomial form of Benjamin Wrensch ("Minimal AgX Implementation", 2023) for Rec. 709
+/// primaries; its output is display-encoded.
+fn agx(v: Rgb) -> Rgb {
+    const INSET: [[f32; 3]; 3] = [
+        [0.842_479_06, 0.078_433_6, 0.079_223_745],
+        [0.042_328_242, 0.878_468_64, 0.079_166_13],
+        [0.042_375_655, 0.078_433_6, 0.879_142_97],
+    ];
+    const OUTSET: [[f32; 3]; 3] = [
+        [1.196_879, -0.098_020_88, -0.099_029_745],
+        [-0.052_896_85, 1.151_903_1, -0.098_961_18],
+        [-0.052_971_635, -0.098_043_45, 1.151_073_7],
+    ];
+    // Stops around middle grey 0.18 that the curve covers.
+    const MIN_EV: f32 = -12.473_93;
+    const MAX_EV: f32 = 4.026_069;
+    let curve = |x: f32| {
+        let x2 = x * x;
+        let x4 = x2 * x2;
+        15.5 * x4 * x2 - 40.14 * x4 * x + 31.96 * x4 - 6.868 * x2 * x + 0.4298 * x2 + 0.1191 * x - 0.002_32
+    };
+    let log = |v: f32| ((v.max(1e-10).log2() - MIN_EV) / (MAX_EV - MIN_EV)).clamp(0.0, 1.0);
+    transform(&OUTSET, transform(&INSET, v).map(|v| curve(log(v)))).map(|v| v.clamp(0.0, 1.0))
+}
+
+/// ACES (RRT and sRGB ODT), in the fit of Stephen Hill (BakingLab, 2016).
+fn aces(v: Rgb) -> Rgb {
+    const INPUT: [[f32; 3]; 3] =
+        [[0.597_19, 0.354_58, 0.048_23], [0.076, 0.908_34, 0.015_66], [0.028_4, 0.133_83, 0.837_77]];
+    const OUTPUT: [[f32; 3]; 3] =
+        [[1.604_75, -0.531_08, -0.073_67], [-0.102_08, 1.108_13, -0.006_05], [-0.003_27, -0.072_76, 1.076_02]];
+    let fit = |v: f32| (v * (v + 0.024_578_6) - 0.000_090_537) / (v * (0.983_729 * v + 0.432_951) + 0.238_081);
+    transform(&OUTPUT, transform(&INPUT, v).map(fit)).map(encode_srgb)
+}
+
+/// Turns pixels of `channels` (3 or 4) numbers into 8-bit sRGB. Alpha, where there is one, is kept linear; premultiplied
+/// colours stay premultiplied.
+pub fn to_srgb8(pixels: &[f32], channels: usize, exposure: f32, tone_map: &str) -> Result<Vec<u8>> {
+    let map = match tone_map {
+        "agx" => agx,
+        "aces" => aces,
+        "none" => |v: Rgb| v.map(encode_srgb),
+        _ => return Err(Error::parameter("tonemap", format!("{tone_map:?}"), format!("one of {TONE_MAPS:?}"))),
+    };
+    if !exposure.is_finite() {
+        return Err(Error::parameter("exposure", exposure, "a finite number of stops"));
+    }
+    let gain = exposure.exp2();
+    let byte = |v: f32| (v * 255.0 + 0.5) as u8;
+    let mut out = Vec::with_capacity(pixels.len());
+    for pixel in pixels.chunks_exact(channels) {
+        out.extend(map([pixel[0] * gain, pixel[1] * gain, pixel[2] * gain]).map(byte));
+        out.extend(pixel[3..].iter().map(|alpha| byte(alpha.clamp(0.0, 1.0))));
+    }
+    Ok(out)
+}

@@ -1,0 +1,449 @@
+//! The GPU: finding an adapter, opening a device once per process, and waiting for it without hanging.
+
+use std::collections::HashMap;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::time::{Duration, Instant};
+
+use crate::error::{Error, Result};
+use crate::kernel::{Binding, Kernel};
+use crate::passes::noise::Noise;
+
+/// What an adapter says of itself.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct AdapterInfo {
+    /// Its name, such as `llvmpipe (LLVM 15.0.6, 256 bits)`.
+    pub name: String,
+    /// Driver and version.
+    pub driver: String,
+    /// `vulkan`, `metal` or `dx12`.
+    pub backend: String,
+    /// `discrete`, `integrated`, `virtual`, `cpu` or `other`.
+    pub kind: String,
+    /// PCI bus address, empty where there is none.
+    pub pci: String,
+}
+
+/// How long one submission, meant to take a tenth of a second, may take before the device counts as hung.
+const HUNG: Duration = Duration::from_secs(300);
+/// How long to wait between looks at the caller's interrupt.
+const SLICE: Duration = Duration::from_millis(100);
+
+/// Asked while waiting: an error stops the work (Ctrl-C).
+pub type Interrupt<'a> = &'a dyn Fn() -> Result<()>;
+
+static PROCESS: AtomicU32 = AtomicU32::new(0);
+static INSTANCE: OnceLock<wgpu::Instance> = OnceLock::new();
+// Never dropped: some drivers crash when a device goes away while the process exits.
+static OPEN: Mutex<Vec<(usize, Arc<Gpu>)>> = Mutex::new(Vec::new());
+
+/// Locks a mutex whose data no panic can leave half-written.
+pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// An error in a child that was forked after the driver had started threads: they do not exist there, and the first
+/// call would wait for them for ever.
+pub fn check_fork() -> Result<()> {
+    let ours = std::process::id();
+    match PROCESS.load(Ordering::Relaxed) {
+        0 => Ok(()),
+        pid if pid == ours => Ok(()),
+        _ => Err(Error::Fork),
+    }
+}
+
+/// The adapters, best first: discrete, integrated, virtual, other, CPU.
+fn enumerate() -> Result<Vec<wgpu::Adapter>> {
+    check_fork()?;
+    PROCESS.store(std::process::id(), Ordering::Relaxed);
+    let instance = INSTANCE.get_or_init(|| {
+        let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+        // Never OpenGL: it is not even compiled in.
+        descriptor.backends = wgpu::Backends::VULKAN | wgpu::Backends::METAL | wgpu::Backends::DX12;
+        wgpu::Instance::new(descriptor)
+    });
+    let mut adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()));
+    adapters.sort_by_key(|adapter| match adapter.get_info().device_type {
+        wgpu::DeviceType::DiscreteGpu => 0,
+        wgpu::DeviceType::IntegratedGpu => 1,
+        wgpu::DeviceType::VirtualGpu => 2,
+        wgpu::DeviceType::Other => 3,
+        wgpu::DeviceType::Cpu => 4,
+    });
+    Ok(adapters)
+}
+
+fn describe(adapter: &wgpu::Adapter) -> AdapterInfo {
+    let info = adapter.get_info();
+    let kind = match info.device_type {
+        wgpu::DeviceType::DiscreteGpu => "discrete",
+        wgpu::DeviceType::IntegratedGpu => "integrated",
+        wgpu::DeviceType::VirtualGpu => "virtual",
+        wgpu::DeviceType::Cpu => "cpu",
+        wgpu::DeviceType::Other => "other",
+    };
+    AdapterInfo {
+        name: info.name,
+        driver: format!("{} {}", info.driver, info.driver_info).trim().to_owned(),
+        backend: info.backend.to_str().to_owned(),
+        kind: kind.to_owned(),
+        pci: info.device_pci_bus_id,
+    }
+}
+
+/// The adapters that can be used, best first.
+pub fn adapters() -> Result<Vec<AdapterInfo>> {
+    Ok(enumerate()?.iter().map(describe).collect())
+}
+
+/// Which of `adapters` `wanted` means: an index, a kind, or a part of its name, driver or PCI address.
+fn choose(adapters: &[AdapterInfo], wanted: Option<&str>) -> Result<usize> {
+    let list = || {
+        let lines: Vec<_> = adapters
+            .iter()
+            .enumerate()
+            .map(|(i, a)| format!("  {i}: {} ({}, {}, {})", a.name, a.kind, a.backend, a.driver))
+            .collect();
+        if lines.is_empty() { "  none".to_owned() } else { lines.join("\n") }
+    };
+    if adapters.is_empty() {
+        return Err(Error::Adapter(
+            "no Vulkan adapter was found. Either the loader is missing, or no driver is installed, or a container hides \
+             the GPU (NVIDIA: NVIDIA_DRIVER_CAPABILITIES=graphics). A driver that needs no GPU: apt-get install \
+             mesa-vulkan-drivers libvulkan1"
+                .into(),
+        ));
+    }
+    let Some(wanted) = wanted.map(str::trim).filter(|wanted| !wanted.is_empty()) else { return Ok(0) };
+    let found = match wanted.parse::<usize>() {
+        Ok(index) => (index < adapters.len()).then_some(index),
+        Err(_) => {
+            let wanted = wanted.to_lowercase();
+            adapters.iter().position(|a| {
+                let pci = !a.pci.is_empty() && a.pci.to_lowercase() == wanted;
+                a.kind == wanted || pci || format!("{} {}", a.name, a.driver).to_lowercase().contains(&wanted)
+            })
+        }
+    };
+    found.ok_or_else(|| Error::Adapter(format!("no adapter matches {wanted:?}; found:\n{}", list())))
+}
+
+/// An open device with all that is shared by the renderers on it.
+pub struct Gpu {
+    /// The adapter.
+    pub info: AdapterInfo,
+    pub(crate) device: wgpu::Device,
+    pub(crate) queue: wgpu::Queue,
+    /// Most bytes that one buffer can hold for a shader.
+    pub(crate) max_buffer: u64,
+    pub(crate) repeat_sampler: wgpu::Sampler,
+    pub(crate) clamp_sampler: wgpu::Sampler,
+    /// The last noise bake: renderers of the same seed share it.
+    pub(crate) noise: Mutex<Option<Arc<Noise>>>,
+    kernels: Mutex<HashMap<String, Arc<Kernel>>>,
+    nanoseconds_per_tick: Option<f64>,
+    failure: Arc<Mutex<Failure>>,
+}
+
+#[derive(Default)]
+struct Failure {
+    /// The first error that no call has reported yet.
+    error: Option<String>,
+    lost: bool,
+}
+
+impl Gpu {
+    /// The device of the adapter that `wanted` means, opened on first use; with none, the best.
+    pub fn open(wanted: Option<&str>) -> Result<Arc<Self>> {
+        check_fork()?;
+        let adapters = enumerate()?;
+        let infos: Vec<_> = adapters.iter().map(describe).collect();
+        let index = choose(&infos, wanted)?;
+        let mut open = lock(&OPEN);
+        open.retain(|(_, gpu)| !lock(&gpu.failure).lost);
+        if let Some((_, gpu)) = open.iter().find(|(i, _)| *i == index) {
+            return Ok(gpu.clone());
+        }
+        let gpu = Arc::new(Self::new(&adapters[index], infos[index].clone())?);
+        open.push((index, gpu.clone()));
+        Ok(gpu)
+    }
+
+    fn new(adapter: &wgpu::Adapter, info: AdapterInfo) -> Result<Self> {
+        let offered = adapter.limits();
+        // What the code needs and no more, but as long a buffer as there is: it bounds the size of `animate`'s frames.
+        let limits = wgpu::Limits {
+            max_buffer_size: offered.max_buffer_size,
+            max_storage_buffer_binding_size: offered.max_storage_buffer_binding_size,
+            ..wgpu::Limits::default()
+        };
+        let timestamps = wgpu::Features::TIMESTAMP_QUERY & adapter.features();
+        let descriptor = wgpu::DeviceDescriptor {
+            label: Some("nubis"),
+            required_features: timestamps,
+            required_limits: limits,
+            ..Default::default()
+        };
+        let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
+            .map_err(|error| Error::Adapter(format!("{} ({}) gives no device: {error}", info.name, info.driver)))?;
+
+        let failure = Arc::new(Mutex::new(Failure::default()));
+        let reported = failure.clone();
+        // Without this wgpu panics on the first error.
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
+            lock(&reported).error.get_or_insert_with(|| error.to_string());
+        }));
+        let reported = failure.clone();
+        device.set_device_lost_callback(move |reason, message| {
+            let mut failure = lock(&reported);
+            failure.lost = true;
+            failure.error = Some(format!("the device was lost ({reason:?}): {message}"));
+        });
+
+        let sampler = |label, address| {
+            device.create_sampler(&wgpu::SamplerDescriptor {
+                label: Some(label),
+                address_mode_u: address,
+                address_mode_v: address,
+                address_mode_w: address,
+                mag_filter: wgpu::FilterMode::Linear,
+                min_filter: wgpu::FilterMode::Linear,
+                // One mip, not two: half the cost of a read on lavapipe.
+                mipmap_filter: wgpu::MipmapFilterMode::Nearest,
+                ..Default::default()
+            })
+        };
+        Ok(Self {
+            info,
+            repeat_sampler: sampler("repeat_sampler", wgpu::AddressMode::Repeat),
+            clamp_sampler: sampler("clamp_sampler", wgpu::AddressMode::ClampToEdge),
+            max_buffer: offered.max_storage_buffer_binding_size.min(offered.max_buffer_size),
+            noise: Mutex::new(None),
+            kernels: Mutex::new(HashMap::new()),
+            nanoseconds_per_tick: (!timestamps.is_empty()).then(|| f64::from(queue.get_timestamp_period())),
+            failure,
+            device,
+            queue,
+        })
+    }
+
+    /// The kernel `entry` of `shaders/wgsl/passes/{pass}.wgsl`, compiled on first use.
+    pub fn kernel(&self, pass: &str, entry: &str) -> Result<Arc<Kernel>> {
+        let mut kernels = lock(&self.kernels);
+        if let Some(kernel) = kernels.get(entry) {
+            return Ok(kernel.clone());
+        }
+        let kernel = Arc::new(Kernel::new(self, pass, entry)?);
+        kernels.insert(entry.to_owned(), kernel.clone());
+        Ok(kernel)
+    }
+
+    /// The first error since the last call, if any.
+    pub(crate) fn check(&self) -> Result<()> {
+        let mut failure = lock(&self.failure);
+        let Some(error) = failure.error.take() else { return Ok(()) };
+        if failure.lost {
+            failure.error = Some(error.clone());
+            return Err(Error::Device(format!("{error}; make a new Renderer to go on")));
+        }
+        let advice = if error.to_lowercase().contains("memory") {
+            "; free other GPU memory or render a smaller picture"
+        } else {
+            ""
+        };
+        Err(Error::Device(format!("{error}{advice}")))
+    }
+
+    /// A buffer of `bytes` for shaders.
+    pub(crate) fn buffer(&self, label: &str, bytes: u64) -> wgpu::Buffer {
+        self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(label),
+            size: bytes.max(16),
+            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        })
+    }
+
+    /// A buffer that holds a uniform block of `bytes`.
+    pub(crate) fn uniform(&self, label: &str, bytes: usize) -> wgpu::Buffer {
+        self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(label),
+            size: bytes as u64,
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        })
+    }
+
+    /// A half-float texture of four channels; a depth of 1 makes it flat. Half floats filter exactly on lavapipe, where
+    /// 8-bit ones have 256 levels (docs/numerics.md), and four channels of them can be stored to on every adapter.
+    pub(crate) fn texture(&self, label: &str, size: [u32; 3], mips: u32) -> wgpu::Texture {
+        let flat = size[2] == 1;
+        self.device.create_texture(&wgpu::TextureDescriptor {
+            label: Some(label),
+            size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: size[2] },
+            mip_level_count: mips,
+            sample_count: 1,
+            dimension: if flat { wgpu::TextureDimension::D2 } else { wgpu::TextureDimension::D3 },
+            format: wgpu::TextureFormat::Rgba16Float,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING
+                | wgpu::TextureUsages::STORAGE_BINDING
+                | wgpu::TextureUsages::COPY_DST,
+            view_formats: &[],
+        })
+    }
+
+    /// Fills a flat texture with rows of four channels.
+    pub(crate) fn write_texture(&self, texture: &wgpu::Texture, texels: &[[half::f16; 4]]) {
+        self.queue.write_texture(
+            texture.as_image_copy(),
+            bytemuck::cast_slice(texels),
+            wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(8 * texture.width()), rows_per_image: None },
+            texture.size(),
+        );
+    }
+
+    /// Starts recording work.
+    pub(crate) fn work(&self) -> Work<'_> {
+        let encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("work") });
+        Work { gpu: self, encoder, labels: Vec::new(), queries: Vec::new(), downloads: Vec::new() }
+    }
+
+    fn wait(&self, index: wgpu::SubmissionIndex, interrupt: Interrupt<'_>) -> Result<()> {
+        let started = Instant::now();
+        loop {
+            let poll = wgpu::PollType::Wait { submission_index: Some(index.clone()), timeout: Some(SLICE) };
+            match self.device.poll(poll) {
+                Ok(_) => return self.check(),
+                Err(wgpu::PollError::Timeout) => {
+                    self.check()?;
+                    interrupt()?;
+                    if started.elapsed() > HUNG {
+                        return Err(Error::Device(format!(
+                            "{} has not answered for {} s; make a new Renderer, or choose another adapter",
+                            self.info.name,
+                            HUNG.as_secs()
+                        )));
+                    }
+                }
+                Err(error) => return Err(Error::Device(error.to_string())),
+            }
+        }
+    }
+}
+
+/// Milliseconds on the GPU by kernel, in the order in which they first ran.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Timings(pub Vec<(String, f64)>);
+
+impl Timings {
+    /// Adds time to a kernel's row.
+    pub fn add(&mut self, label: &str, milliseconds: f64) {
+        match self.0.iter_mut().find(|(name, _)| name == label) {
+            Some((_, total)) => *total += milliseconds,
+            None => self.0.push((label.to_owned(), milliseconds)),
+        }
+    }
+}
+
+/// Dispatches and downloads that are submitted together.
+pub(crate) struct Work<'a> {
+    gpu: &'a Gpu,
+    encoder: wgpu::CommandEncoder,
+    labels: Vec<String>,
+    queries: Vec<wgpu::QuerySet>,
+    downloads: Vec<wgpu::Buffer>,
+}
+
+impl Work<'_> {
+    /// Runs a kernel over `extent` invocations (pixels, texels, points), with its variables bound by name.
+    pub fn dispatch(&mut self, kernel: &Kernel, bindings: &[(&str, Binding<'_>)], extent: [u32; 3]) -> Result<()> {
+        let group = kernel.bind(self.gpu, bindings)?;
+        let queries = self.gpu.nanoseconds_per_tick.map(|_| {
+            self.gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
+                label: Some("timestamps"),
+                ty: wgpu::QueryType::Timestamp,
+                count: 2,
+            })
+        });
+        let timestamp_writes = queries.as_ref().map(|query_set| wgpu::ComputePassTimestampWrites {
+            query_set,
+            beginning_of_pass_write_index: Some(0),
+            end_of_pass_write_index: Some(1),
+        });
+        {
+            let descriptor = wgpu::ComputePassDescriptor { label: Some(&kernel.label), timestamp_writes };
+            let mut pass = self.encoder.begin_compute_pass(&descriptor);
+            pass.set_pipeline(&kernel.pipeline);
+            pass.set_bind_group(0, &group, &[]);
+            let [x, y, z] = std::array::from_fn(|i| extent[i].div_ceil(kernel.workgroup[i]));
+            pass.dispatch_workgroups(x, y, z);
+        }
+        if let Some(queries) = queries {
+            self.labels.push(kernel.label.clone());
+            self.queries.push(queries);
+        }
+        Ok(())
+    }
+
+    /// Brings `bytes` of a buffer back; [`Work::submit`] returns them in the order of the calls.
+    pub fn download(&mut self, buffer: &wgpu::Buffer, offset: u64, bytes: u64) {
+        let staging = self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("staging"),
+            size: bytes,
+            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        self.encoder.copy_buffer_to_buffer(buffer, offset, &staging, 0, bytes);
+        self.downloads.push(staging);
+    }
+
+    /// Runs everything, waits for it, adds to `timings` and returns the downloads.
+    pub fn submit(mut self, timings: &mut Timings, interrupt: Interrupt<'_>) -> Result<Vec<Download>> {
+        interrupt()?;
+        let gpu = self.gpu;
+        if !self.queries.is_empty() {
+            // Query results are resolved at multiples of 256 bytes.
+            let resolved = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("timestamps"),
+                size: 256 * self.queries.len() as u64,
+                usage: wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC,
+                mapped_at_creation: false,
+            });
+            for (i, queries) in self.queries.iter().enumerate() {
+                self.encoder.resolve_query_set(queries, 0..2, &resolved, 256 * i as u64);
+            }
+            let bytes = resolved.size();
+            self.download(&resolved, 0, bytes);
+        }
+        let index = gpu.queue.submit([self.encoder.finish()]);
+        for staging in &self.downloads {
+            // Failures come out of get_mapped_range.
+            staging.map_async(wgpu::MapMode::Read, .., |_| {});
+        }
+        gpu.wait(index, interrupt)?;
+        let mut downloads = Vec::new();
+        for staging in self.downloads {
+            let view = staging.get_mapped_range(..).map_err(|error| Error::Device(error.to_string()))?;
+            downloads.push(Download(view));
+        }
+        if let (Some(period), false) = (gpu.nanoseconds_per_tick, self.queries.is_empty()) {
+            let ticks = downloads.pop().expect("the timestamps were downloaded last");
+            for (i, label) in self.labels.iter().enumerate() {
+                let pair: &[u64] = bytemuck::cast_slice(&ticks.0[256 * i..256 * i + 16]);
+                timings.add(label, pair[1].saturating_sub(pair[0]) as f64 * period * 1e-6);
+            }
+        }
+        Ok(downloads)
+    }
+}
+
+/// Bytes that came back from the GPU.
+pub(crate) struct Download(wgpu::BufferView);
+
+impl Download {
+    /// The bytes as numbers.
+    pub fn numbers<T: bytemuck::AnyBitPattern>(&self) -> &[T] {
+        bytemuck::cast_slice(&self.0)
+    }
+}

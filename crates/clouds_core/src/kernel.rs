@@ -1,0 +1,109 @@
+//! A compute pipeline whose resources are bound by name: binding numbers and workgroup sizes stand in WGSL alone.
+
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+use crate::shader::Linked;
+use wgpu::naga::{AddressSpace, Module, valid::ModuleInfo};
+
+/// Something that a kernel can be given for one of its variables.
+#[derive(Clone, Copy)]
+pub(crate) enum Binding<'a> {
+    Buffer(&'a wgpu::Buffer),
+    View(&'a wgpu::TextureView),
+}
+
+impl<'a> From<&'a wgpu::Buffer> for Binding<'a> {
+    fn from(buffer: &'a wgpu::Buffer) -> Self {
+        Self::Buffer(buffer)
+    }
+}
+
+impl<'a> From<&'a wgpu::TextureView> for Binding<'a> {
+    fn from(view: &'a wgpu::TextureView) -> Self {
+        Self::View(view)
+    }
+}
+
+/// A compute pipeline and the variables that it uses.
+pub struct Kernel {
+    /// Name in timings, benches and GPU debuggers.
+    pub label: String,
+    pub(crate) workgroup: [u32; 3],
+    pub(crate) pipeline: wgpu::ComputePipeline,
+    layout: wgpu::BindGroupLayout,
+    variables: Vec<(String, u32)>,
+}
+
+/// The variables that an entry point uses, with their binding numbers.
+fn used_variables(module: &Module, info: &ModuleInfo, entry: usize) -> Vec<(String, u32)> {
+    let uses = info.get_entry_point(entry);
+    let mut variables = Vec::new();
+    for (handle, variable) in module.global_variables.iter() {
+        if let (false, Some(binding), Some(name)) = (uses[handle].is_empty(), variable.binding, &variable.name)
+            && !matches!(variable.space, AddressSpace::WorkGroup | AddressSpace::Private)
+        {
+            variables.push((name.clone(), binding.binding));
+        }
+    }
+    variables
+}
+
+impl Kernel {
+    /// Links, validates and compiles the kernel `entry` of a pass.
+    pub(crate) fn new(gpu: &Gpu, pass: &str, entry: &str) -> Result<Self> {
+        let linked = Linked::new(&format!("passes/{pass}")).map_err(Error::Device)?;
+        Self::from_linked(gpu, &linked, entry)
+    }
+
+    pub(crate) fn from_linked(gpu: &Gpu, linked: &Linked, entry: &str) -> Result<Self> {
+        let (module, info) = linked.parse().map_err(Error::Device)?;
+        let index = module
+            .entry_points
+            .iter()
+            .position(|point| point.name == entry)
+            .ok_or_else(|| Error::Device(format!("no kernel named {entry:?}")))?;
+        let workgroup = module.entry_points[index].workgroup_size;
+        let variables = used_variables(&module, &info, index);
+        let descriptor = wgpu::ShaderModuleDescriptor {
+            label: Some(entry),
+            source: wgpu::ShaderSource::Wgsl(linked.code.as_str().into()),
+        };
+        let checks = wgpu::ShaderRuntimeChecks { force_loop_bounding: false, ..Default::default() };
+        // SAFETY: only loop bounding is off, which costs a counter in every loop (ten times the time on some drivers,
+        // gfx-rs/wgpu#7698). The shaders are this crate's own, and each of their loops is counted. Bounds checks stay.
+        let shader = unsafe { gpu.device.create_shader_module_trusted(descriptor, checks) };
+        let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some(entry),
+            layout: None,
+            module: &shader,
+            entry_point: Some(entry),
+            compilation_options: wgpu::PipelineCompilationOptions {
+                zero_initialize_workgroup_memory: false,
+                ..Default::default()
+            },
+            cache: None,
+        });
+        let layout = pipeline.get_bind_group_layout(0);
+        gpu.check()?;
+        Ok(Self { label: entry.to_owned(), workgroup, pipeline, layout, variables })
+    }
+
+    /// A bind group with each used variable's resource. Samplers bind themselves.
+    pub(crate) fn bind(&self, gpu: &Gpu, bindings: &[(&str, Binding<'_>)]) -> Result<wgpu::BindGroup> {
+        let mut entries = Vec::new();
+        for (name, number) in &self.variables {
+            let given = bindings.iter().find(|(given, _)| given == name).map(|(_, binding)| *binding);
+            let resource = match (given, name.as_str()) {
+                (Some(Binding::Buffer(buffer)), _) => buffer.as_entire_binding(),
+                (Some(Binding::View(view)), _) => wgpu::BindingResource::TextureView(view),
+                (None, "repeat_sampler") => wgpu::BindingResource::Sampler(&gpu.repeat_sampler),
+                (None, "clamp_sampler") => wgpu::BindingResource::Sampler(&gpu.clamp_sampler),
+                (None, _) => return Err(Error::Device(format!("{}: nothing bound to {name}", self.label))),
+            };
+            entries.push(wgpu::BindGroupEntry { binding: *number, resource });
+        }
+        let descriptor =
+            wgpu::BindGroupDescriptor { label: Some(&self.label), layout: &self.layout, entries: &entries };
+        Ok(gpu.device.create_bind_group(&descriptor))
+    }
+}

@@ -1,0 +1,25 @@
+//! Volumetric clouds by ray marching on Vulkan compute.
+//!
+//! [`Params`] says what a sky looks like and [`Quality`] how it is computed; [`Renderer`] makes a picture of it, in one
+//! function that reads top to bottom. `ARCHITECTURE.md` follows a frame through the files.
+
+mod blue_noise;
+pub mod camera;
+pub mod color;
+pub mod error;
+pub mod files;
+pub mod frame;
+pub mod generate;
+pub mod gpu;
+mod kernel;
+pub mod params;
+mod passes;
+pub mod renderer;
+pub mod schema;
+pub mod shader;
+
+pub use camera::Camera;
+pub use error::{Error, Result};
+pub use gpu::{AdapterInfo, Gpu, adapters};
+pub use params::{Params, Quality};
+pub use renderer::Renderer;

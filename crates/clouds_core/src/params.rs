@@ -1,0 +1,368 @@
+//! Every parameter, once. A line here reaches Rust, WGSL, the Python dataclasses and the manual.
+//!
+//! What a sky looks like is in [`Params`]; how it is computed is in [`Quality`], which never changes the look. The
+//! sources are named as in `docs/sources.md`: nubis2015, thesis2018, vsu2022, gems2001.
+
+use std::sync::Arc;
+
+use crate::error::{Error, Result};
+use crate::schema::{self, Block, Map};
+use crate::{choice, params};
+
+choice! {
+    /// Which noises the base shape is made of.
+    Noise {
+        /// Perlin-Worley and three octaves of Worley FBM.
+        Nubis2015 = "nubis2015",
+        /// Perlin-Worley of rising frequency in every channel.
+        Vsu2022 = "vsu2022",
+    }
+}
+
+choice! {
+    /// How sunlight becomes the brightness of a cloud.
+    Model {
+        /// Physical single scattering and nothing else.
+        Single = "single",
+        /// Beer times powder times Henyey-Greenstein times 2, and ambient.
+        Nubis2015 = "nubis2015",
+        /// Beer with a slower second term, the larger of two lobes, powder, and ambient.
+        Thesis2018 = "thesis2018",
+        /// As nubis2015 with a blend of two lobes.
+        Vsu2022 = "vsu2022",
+    }
+}
+
+params! {
+    /// The sun.
+    Sun {
+        /// Height above the horizon.
+        elevation: f32 = 40.0, in -90..=90 "degrees";
+        /// Compass direction, clockwise from north.
+        azimuth: f32 = 120.0, in -360..=360 "degrees";
+        /// Irradiance on a plane that faces the sun, above the atmosphere (linear Rec. 709).
+        irradiance: [f32; 3] = [5.0, 5.0, 5.0], in 0..=1000000 "";
+        /// Whether the sun's disc is drawn.
+        visible: bool = true;
+    }
+
+    /// The volumetric clouds: where they are and what they are made of.
+    Clouds {
+        /// How much of the sky is cloudy: shifts the weather map's coverage, 0 is clear, 0.5 the map as it is, 1 overcast.
+        coverage: f32 = 0.45, in 0..=1 "";
+        /// Cloud type: 0 stratus, 0.5 stratocumulus, 1 cumulus. Shifts the weather map's type, 0.5 the map as it is.
+        r#type: f32 = 0.85, in 0..=1 "";
+        /// Rain: thickens and darkens the clouds (nubis2015). Scales the weather map's precipitation, 0 is dry.
+        precipitation: f32 = 0.0, in 0..=1 "";
+        /// Altitude of the cloud base.
+        base: f32 = 1200.0, in 0..=20000 "m";
+        /// Altitude of the highest cloud tops.
+        top: f32 = 3200.0, in 1..=25000 "m";
+        /// Extinction where the density is 1.
+        extinction: f32 = 0.06, in 0..=100000000 "1/m";
+        /// Which random shapes.
+        seed: u32 = 1, in 0..=4294967295.0 "";
+        /// Which noises the shapes are made of.
+        noise: Noise = Noise::Nubis2015;
+        /// Width of one tile of the base shape.
+        shape_scale: f32 = 5200.0, in 100..=200000 "m";
+        /// Width of one tile of the detail that erodes the edges.
+        detail_scale: f32 = 640.0, in 10..=50000 "m";
+        /// How deep the detail erodes the edges (nubis2015: 0.2).
+        detail: f32 = 0.25, in 0..=1 "";
+        /// Width of one tile of the curl noise that swirls the detail.
+        curl_scale: f32 = 2400.0, in 10..=50000 "m";
+        /// How far curl noise displaces the detail at the base.
+        curl: f32 = 90.0, in 0..=2000 "m";
+    }
+
+    /// The weather map: where the clouds stand.
+    Weather {
+        /// Width of the square that one map covers; beyond it the map repeats.
+        extent: f32 = 60000.0, in 100..=10000000 "m";
+        /// A map of your own: coverage, type and precipitation, row 0 in the north; None bakes one from noise.
+        map: Option<Arc<Map>> = None, in 0..=1 "";
+        /// Which random weather.
+        seed: u32 = 7, in 0..=4294967295.0 "";
+        /// Typical distance between clouds.
+        scale: f32 = 5000.0, in 100..=1000000 "m";
+        /// How much the cover varies over distances of several clouds.
+        variety: f32 = 0.5, in 0..=1 "";
+    }
+
+    /// What moves the clouds.
+    Wind {
+        /// Compass direction toward which the wind blows, clockwise from north.
+        direction: f32 = 60.0, in -360..=360 "degrees";
+        /// Speed of the base shapes.
+        speed: f32 = 8.0, in -1000..=1000 "m/s";
+        /// Speed of the detail; the difference to `speed` makes the edges boil.
+        detail_speed: f32 = 11.0, in -1000..=1000 "m/s";
+        /// How far the tops lean downwind (nubis2015: 500 m).
+        shear: f32 = 400.0, in -20000..=20000 "m";
+        /// Speed at which the noises rise.
+        updraft: f32 = 0.8, in -100..=100 "m/s";
+        /// Compass direction toward which the weather map drifts.
+        weather_direction: f32 = 60.0, in -360..=360 "degrees";
+        /// Speed of the weather map; 0 keeps a composed sky in place while its shapes evolve (thesis2018).
+        weather_speed: f32 = 8.0, in -1000..=1000 "m/s";
+    }
+
+    /// The thin high clouds, a layer without thickness on its own sphere (nubis2015; animated as in gems2001).
+    HighClouds {
+        /// How much of the sky they cover.
+        coverage: f32 = 0.35, in 0..=1 "";
+        /// Altitude of the layer.
+        altitude: f32 = 8500.0, in 100..=30000 "m";
+        /// Optical depth, seen from straight below, where they are thickest.
+        optical_depth: f32 = 0.5, in 0..=100 "";
+        /// Width of one tile of the texture.
+        scale: f32 = 42000.0, in 1000..=1000000 "m";
+        /// How much longer than wide the streaks are: 1 gives altocumulus, more gives cirrus.
+        stretch: f32 = 3.0, in 1..=16 "";
+        /// Compass direction toward which they drift; the streaks lie along it.
+        direction: f32 = 75.0, in -360..=360 "degrees";
+        /// Speed at which they drift.
+        speed: f32 = 25.0, in -1000..=1000 "m/s";
+        /// How often the largest shapes are replaced by new ones; each octave after it twice as often.
+        evolution: f32 = 0.001, in 0..=10 "1/s";
+        /// Octaves of noise.
+        octaves: u32 = 5, in 1..=8 "";
+        /// Which random shapes.
+        seed: u32 = 3, in 0..=4294967295.0 "";
+        /// Width and height of the texture.
+        texture_size: u32 = 512, in 16..=4096 "texels";
+    }
+
+    /// How light becomes colour.
+    Light {
+        /// The physics of the light in the clouds.
+        model: Model = Model::Thesis2018;
+        /// Mean cosine of the forward lobe of the phase function.
+        g: f32 = 0.6, in -0.9999..=0.9999 "";
+        /// Mean cosine of the backward lobe (thesis2018, vsu2022).
+        g_back: f32 = -0.25, in -0.9999..=0.9999 "";
+        /// Share of the forward lobe (vsu2022).
+        lobe_mix: f32 = 0.5, in 0..=1 "";
+        /// Single-scattering albedo of a droplet (`single`).
+        albedo: f32 = 0.999, in 0..=1 "";
+        /// Gain of the sunlight in the models that do not conserve energy (all but `single`).
+        sun_gain: f32 = 6.0, in 0..=1000 "";
+        /// How thick the models that do not conserve energy take the cloud to be on the way to the sun (all but `single`).
+        absorption: f32 = 0.12, in 0..=10 "";
+        /// Gain of the ambient light (all but `single`).
+        ambient_gain: f32 = 1.0, in 0..=1000 "";
+        /// Tint of the ambient light at the top of the clouds; its brightness comes from the sky.
+        ambient_top: [f32; 3] = [1.0, 1.0, 1.0], in 0..=1000 "";
+        /// Tint of the ambient light at the base of the clouds; its brightness comes from sky and ground.
+        ambient_bottom: [f32; 3] = [1.0, 1.0, 1.0], in 0..=1000 "";
+        /// How strongly thin edges darken ("powdered sugar", nubis2015); 0 switches it off.
+        powder: f32 = 0.6, in 0..=1 "";
+        /// How many times more light is absorbed where precipitation is 1 (nubis2015).
+        rain_absorption: f32 = 2.5, in 1..=100 "";
+        /// Half width of the cone of light samples, as a share of its length; `single` looks straight at the sun.
+        cone: f32 = 0.12, in 0..=1 "";
+    }
+
+    /// The planet and its air.
+    Atmosphere {
+        /// Whether there is air; without it the sky is black and sunlight arrives undimmed.
+        enabled: bool = true;
+        /// Radius of the planet (Earth 6 371 000, thesis2018 400 000).
+        planet_radius: f32 = 6371000.0, in 10000..=1000000000 "m";
+        /// Haze: amount of aerosol, 1 is a clear day.
+        haze: f32 = 1.0, in 0..=20 "";
+        /// How much air stands between the eye and the clouds: 1 is physical, 0 none.
+        aerial_perspective: f32 = 1.0, in 0..=10 "";
+        /// Albedo of the ground.
+        ground_albedo: [f32; 3] = [0.10, 0.12, 0.07], in 0..=1 "";
+    }
+
+    /// The numerical method: how accurately a sky is computed, never how it looks.
+    Quality {
+        /// View steps straight up.
+        steps_zenith: u32 = 80, in 1..=4096 "";
+        /// View steps toward the horizon.
+        steps_horizon: u32 = 192, in 1..=4096 "";
+        /// How much steps grow with distance: 0 makes all of a ray's steps equal, 1 lets a step be a fixed share of its distance.
+        step_growth: f32 = 1.0, in 0..=1 "";
+        /// How many steps one step outside cloud is long; on a hit the march goes back.
+        big_step: u32 = 2, in 1..=16 "";
+        /// Full samples of zero in a row after which samples are cheap again (nubis2015: 6).
+        empty_samples: u32 = 6, in 1..=4096 "";
+        /// Light samples toward the sun, besides the far one.
+        light_steps: u32 = 6, in 1..=128 "";
+        /// How far the light samples reach; the far sample stands for as much as four times that, beyond.
+        light_distance: f32 = 700.0, in 1..=100000 "m";
+        /// Whether there is a far light sample, for shadows from distant clouds.
+        far_sample: bool = true;
+        /// Opacity in front of a sample past which its light samples leave out the detail (nubis2015: 0.3).
+        cheap_light: f32 = 0.3, in 0..=1 "";
+        /// Transmittance at which a ray ends; what is left is scaled away, not lost.
+        min_transmittance: f32 = 0.01, in 0..=0.5 "";
+        /// Whether each ray starts at a blue-noise offset of up to one step.
+        jitter: bool = true;
+        /// Farthest distance at which clouds are marched.
+        view_distance: f32 = 400000.0, in 1000..=1000000000 "m";
+    }
+}
+
+/// Everything that a sky looks like.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[expect(missing_docs, reason = "each block says what it is")]
+pub struct Params {
+    pub sun: Sun,
+    pub clouds: Clouds,
+    pub weather: Weather,
+    pub wind: Wind,
+    pub high_clouds: HighClouds,
+    pub light: Light,
+    pub atmosphere: Atmosphere,
+}
+
+impl Params {
+    /// The blocks with their names.
+    pub fn blocks(&self) -> [(&'static str, &dyn Block); 7] {
+        [
+            ("sun", &self.sun),
+            ("clouds", &self.clouds),
+            ("weather", &self.weather),
+            ("wind", &self.wind),
+            ("high_clouds", &self.high_clouds),
+            ("light", &self.light),
+            ("atmosphere", &self.atmosphere),
+        ]
+    }
+
+    /// The same, to set them.
+    pub fn blocks_mut(&mut self) -> [(&'static str, &mut dyn Block); 7] {
+        [
+            ("sun", &mut self.sun),
+            ("clouds", &mut self.clouds),
+            ("weather", &mut self.weather),
+            ("wind", &mut self.wind),
+            ("high_clouds", &mut self.high_clouds),
+            ("light", &mut self.light),
+            ("atmosphere", &mut self.atmosphere),
+        ]
+    }
+
+    /// Checks every value, and what no range can say.
+    pub fn check(&self) -> Result<()> {
+        for (name, block) in self.blocks() {
+            check_block(name, block)?;
+        }
+        if self.clouds.top <= self.clouds.base {
+            let base = self.clouds.base;
+            return Err(Error::parameter("clouds.top", self.clouds.top, format!("above clouds.base = {base} m")));
+        }
+        Ok(())
+    }
+}
+
+impl Quality {
+    /// The numerical methods that have a name. The last three are the published settings of the sources.
+    pub const NAMES: [&str; 6] = ["draft", "balanced", "high", "nubis2015", "thesis2018", "vsu2022"];
+
+    /// The method called `name`.
+    pub fn named(name: &str) -> Result<Self> {
+        let balanced = Self::default();
+        // The published marches: equal steps, no cut before the end of the shell but at alpha 0.99.
+        let published = Self {
+            steps_zenith: 64,
+            steps_horizon: 128,
+            step_growth: 0.0,
+            big_step: 1,
+            light_steps: 5,
+            ..balanced.clone()
+        };
+        Ok(match name {
+            "balanced" => balanced,
+            "draft" => Self { steps_zenith: 40, steps_horizon: 96, light_steps: 4, ..balanced },
+            "high" => Self {
+                steps_zenith: 192,
+                steps_horizon: 512,
+                light_steps: 12,
+                cheap_light: 1.0,
+                min_transmittance: 0.002,
+                ..balanced
+            },
+            // "A sample and five more in a cone"; the sixth is the far one.
+            "nubis2015" => published,
+            // Options A to D of the text: big steps of three, ten empty samples, light samples always full.
+            "thesis2018" => Self { big_step: 3, empty_samples: 10, cheap_light: 1.0, ..published },
+            "vsu2022" => Self {
+                steps_zenith: 250,
+                steps_horizon: 250,
+                light_steps: 64,
+                light_distance: 2000.0,
+                far_sample: false,
+                cheap_light: 1.0,
+                ..published
+            },
+            _ => return Err(Error::parameter("quality", format!("{name:?}"), format!("one of {:?}", Self::NAMES))),
+        })
+    }
+
+    /// Checks every value, and what no range can say.
+    pub fn check(&self) -> Result<()> {
+        check_block("quality", self)?;
+        // lavapipe ends loops without a word after 65,535 iterations summed over a shader (docs/numerics.md).
+        let samples = self.steps_zenith.max(self.steps_horizon) * (2 + self.light_steps);
+        if samples > 30_000 {
+            return Err(Error::parameter(
+                "quality.light_steps",
+                self.light_steps,
+                format!("so small that view steps times (2 + light steps), here {samples}, is at most 30000"),
+            ));
+        }
+        Ok(())
+    }
+}
+
+fn check_block(name: &str, block: &dyn Block) -> Result<()> {
+    for (index, field) in block.fields().iter().enumerate() {
+        field.check(name, &block.get(index))?;
+    }
+    Ok(())
+}
+
+/// A block by the name that Python calls its type: every block of [`Params`], and [`Quality`].
+pub fn block(type_name: &str) -> Option<Box<dyn Block>> {
+    let Params { sun, clouds, weather, wind, high_clouds, light, atmosphere } = Params::default();
+    let quality = Quality::default();
+    let blocks: [Box<dyn Block>; 8] = [
+        Box::new(sun),
+        Box::new(clouds),
+        Box::new(weather),
+        Box::new(wind),
+        Box::new(high_clouds),
+        Box::new(light),
+        Box::new(atmosphere),
+        Box::new(quality),
+    ];
+    blocks.into_iter().find(|block| block.type_name() == type_name)
+}
+
+/// Where each block starts in the `params` uniform, and the size of the whole, in bytes.
+pub fn uniform_layout() -> (Vec<(&'static str, &'static str, usize)>, usize) {
+    let params = Params::default();
+    let mut offset = 0;
+    let mut blocks = Vec::new();
+    for (name, block) in params.blocks() {
+        blocks.push((name, block.type_name(), offset));
+        offset += schema::size(block.fields());
+    }
+    (blocks, offset)
+}
+
+/// The words of the `params` uniform.
+pub fn uniform(params: &Params) -> Vec<u32> {
+    let mut words = Vec::new();
+    for (_, block) in params.blocks() {
+        let start = words.len();
+        words.resize(start + schema::size(block.fields()) / 4, 0);
+        block.write(&mut words[start..]);
+    }
+    words
+}

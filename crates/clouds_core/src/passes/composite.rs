@@ -1,0 +1,41 @@
+//! The clouds before the sky: what the caller gets.
+
+use super::Bindings;
+use super::march::Marched;
+use crate::error::Result;
+use crate::frame::Frame;
+use crate::gpu::{Gpu, Work};
+
+/// The picture, of a band or whole.
+pub(crate) struct Composed {
+    /// Radiance and alpha.
+    pub image: wgpu::Buffer,
+    /// Radiance of the sky without clouds.
+    pub sky: wgpu::Buffer,
+    /// Depth of all clouds, -1 where there is none.
+    pub depth: wgpu::Buffer,
+}
+
+impl Composed {
+    pub fn new(gpu: &Gpu, pixels: u64) -> Self {
+        Self {
+            image: gpu.buffer("image", 16 * pixels),
+            sky: gpu.buffer("sky", 16 * pixels),
+            depth: gpu.buffer("depth", 4 * pixels),
+        }
+    }
+}
+
+/// Composes the band of `frame`.
+pub(crate) fn run(
+    gpu: &Gpu,
+    work: &mut Work<'_>,
+    world: &Bindings<'_>,
+    frame: &Frame,
+    marched: &Marched,
+    out: &Composed,
+) -> Result<()> {
+    let ours = [("image", (&out.image).into()), ("sky", (&out.sky).into()), ("depth", (&out.depth).into())];
+    let bindings = [world.as_slice(), &marched.bindings(), &ours].concat();
+    work.dispatch(&*gpu.kernel("composite", "composite")?, &bindings, [frame.width, frame.rows, 1])
+}

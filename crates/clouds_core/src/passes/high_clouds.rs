@@ -1,0 +1,35 @@
+//! The texture of the high clouds, made again when its shapes have evolved.
+
+use super::weather::bake_map;
+use super::{Baked, Bindings, Context};
+use crate::error::Result;
+use crate::frame::Frame;
+use crate::params::Params;
+
+/// What the texture is made from: seed, octaves, stretch, size, and the ages and numbers of its updates.
+type Key = (u32, u32, f32, u32, [[f32; 4]; 4]);
+
+/// The texture of the high clouds on the GPU.
+pub(crate) struct HighClouds {
+    map: Baked<Key, wgpu::TextureView>,
+}
+
+impl HighClouds {
+    pub const fn new() -> Self {
+        Self { map: Baked::new() }
+    }
+
+    pub fn run(&mut self, ctx: &mut Context<'_>, params: &Params, frame: &Frame) -> Result<Bindings<'_>> {
+        let high = &params.high_clouds;
+        let updates = [frame.high_age, frame.high_age_small, frame.high_update, frame.high_update_small];
+        // A sky without high clouds reads no texture, but a kernel that could must be given one.
+        let size = if high.coverage > 0.0 { high.texture_size } else { 1 };
+        let key = (high.seed, high.octaves, high.stretch, size, updates);
+        let view = self.map.get(key, || {
+            let texture = ctx.gpu.texture("high_clouds", [size, size, 1], 1);
+            bake_map(ctx, "high_clouds", "high_clouds", &texture)?;
+            Ok(texture.create_view(&wgpu::TextureViewDescriptor::default()))
+        })?;
+        Ok(vec![("high_map", view.into())])
+    }
+}

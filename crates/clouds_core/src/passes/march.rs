@@ -1,0 +1,40 @@
+//! The march through the clouds, of every pixel or of a subset.
+
+use super::Bindings;
+use crate::error::Result;
+use crate::frame::Frame;
+use crate::gpu::{Gpu, Work};
+
+/// What the march makes of each pixel of a band or of a picture.
+pub(crate) struct Marched {
+    /// Premultiplied radiance and transmittance.
+    pub clouds: wgpu::Buffer,
+    /// Metres to the mean scattering point, -1 where there is none.
+    pub depth: wgpu::Buffer,
+    /// Density evaluations.
+    pub samples: wgpu::Buffer,
+}
+
+impl Marched {
+    pub fn new(gpu: &Gpu, pixels: u64) -> Self {
+        Self {
+            clouds: gpu.buffer("clouds", 16 * pixels),
+            depth: gpu.buffer("cloud_depth", 4 * pixels),
+            samples: gpu.buffer("samples", 4 * pixels),
+        }
+    }
+
+    pub fn bindings(&self) -> Bindings<'_> {
+        vec![
+            ("clouds", (&self.clouds).into()),
+            ("cloud_depth", (&self.depth).into()),
+            ("samples", (&self.samples).into()),
+        ]
+    }
+}
+
+/// Marches the band of `frame` through the `world` (uniforms, noises, maps, sky).
+pub(crate) fn run(gpu: &Gpu, work: &mut Work<'_>, world: &Bindings<'_>, frame: &Frame, out: &Marched) -> Result<()> {
+    let bindings = [world.as_slice(), &out.bindings()].concat();
+    work.dispatch(&*gpu.kernel("march", "march")?, &bindings, [frame.march_width, frame.rows, 1])
+}

@@ -1,0 +1,87 @@
+//! One module for each pass, with the WGSL file of the same name: what it reads, what it makes, when it runs again.
+
+pub mod composite;
+pub mod high_clouds;
+pub mod march;
+pub mod noise;
+pub mod points;
+pub mod reproject;
+pub mod sky;
+pub mod weather;
+
+use crate::error::Result;
+use crate::frame::Frame;
+use crate::gpu::{Gpu, Interrupt, Timings};
+use crate::kernel::Binding;
+use crate::params::{self, Params, Quality};
+use crate::schema::{self, Block as _};
+
+/// The variables that a kernel may use, by name.
+pub(crate) type Bindings<'a> = Vec<(&'static str, Binding<'a>)>;
+
+/// What every pass needs: the device, the uniform blocks, and where time and interrupts go.
+pub(crate) struct Context<'a> {
+    pub gpu: &'a Gpu,
+    pub uniforms: &'a Uniforms,
+    pub timings: &'a mut Timings,
+    pub interrupt: Interrupt<'a>,
+}
+
+/// The uniform blocks on the GPU.
+pub(crate) struct Uniforms {
+    params: wgpu::Buffer,
+    frame: wgpu::Buffer,
+    quality: wgpu::Buffer,
+}
+
+impl Uniforms {
+    pub fn new(gpu: &Gpu) -> Self {
+        Self {
+            params: gpu.uniform("params", params::uniform_layout().1),
+            frame: gpu.uniform("frame", schema::size(Frame::FIELDS)),
+            quality: gpu.uniform("quality", schema::size(Quality::FIELDS)),
+        }
+    }
+
+    pub fn upload(&self, gpu: &Gpu, params: &Params, frame: &Frame, quality: &Quality) {
+        gpu.queue.write_buffer(&self.params, 0, bytemuck::cast_slice(&params::uniform(params)));
+        let mut words = vec![0; schema::size(Quality::FIELDS) / 4];
+        quality.write(&mut words);
+        gpu.queue.write_buffer(&self.quality, 0, bytemuck::cast_slice(&words));
+        self.upload_frame(gpu, frame);
+    }
+
+    /// For the next band of the same picture.
+    pub fn upload_frame(&self, gpu: &Gpu, frame: &Frame) {
+        let mut words = vec![0; schema::size(Frame::FIELDS) / 4];
+        frame.write(&mut words);
+        gpu.queue.write_buffer(&self.frame, 0, bytemuck::cast_slice(&words));
+    }
+
+    pub fn bindings(&self) -> Bindings<'_> {
+        vec![
+            ("params", (&self.params).into()),
+            ("frame", (&self.frame).into()),
+            ("quality", (&self.quality).into()),
+        ]
+    }
+}
+
+/// A bake and what it was made from: made again only when that changes.
+pub(crate) struct Baked<K, T> {
+    made: Option<(K, T)>,
+}
+
+impl<K: PartialEq, T> Baked<K, T> {
+    pub const fn new() -> Self {
+        Self { made: None }
+    }
+
+    pub fn get(&mut self, key: K, bake: impl FnOnce() -> Result<T>) -> Result<&T> {
+        if self.made.as_ref().is_none_or(|(made_from, _)| *made_from != key) {
+            self.made = None;
+            self.made = Some((key, bake()?));
+        }
+        Ok(&self.made.as_ref().expect("was just made").1)
+    }
+}

@@ -1,0 +1,76 @@
+//! The three noise textures of nubis2015, baked once for a seed and shared by all renderers on a device.
+
+use std::sync::Arc;
+
+use super::{Bindings, Context};
+use crate::error::Result;
+use crate::gpu::lock;
+use crate::params::{self, Params};
+
+/// Texels of the base shape's side (nubis2015).
+const SHAPE_SIZE: u32 = 128;
+/// Texels of the detail's side (nubis2015).
+const DETAIL_SIZE: u32 = 32;
+/// Texels of the curl noise's side (nubis2015).
+const CURL_SIZE: u32 = 128;
+
+/// The baked textures.
+pub struct Noise {
+    key: (u32, params::Noise),
+    shape: wgpu::TextureView,
+    detail: wgpu::TextureView,
+    curl: wgpu::TextureView,
+}
+
+impl Noise {
+    /// The noise for these parameters: the last one baked if it fits, else a new one.
+    pub(crate) fn run(ctx: &mut Context<'_>, params: &Params) -> Result<Arc<Self>> {
+        let key = (params.clouds.seed, params.clouds.noise);
+        let mut shared = lock(&ctx.gpu.noise);
+        if let Some(noise) = shared.as_ref().filter(|noise| noise.key == key) {
+            return Ok(noise.clone());
+        }
+        let shape = volume(ctx, "shape", SHAPE_SIZE)?;
+        let detail = volume(ctx, "detail", DETAIL_SIZE)?;
+        let curl = ctx.gpu.texture("curl", [CURL_SIZE, CURL_SIZE, 1], 1);
+        super::weather::bake_map(ctx, "noise", "curl", &curl)?;
+        let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
+        let noise = Arc::new(Self { key, shape: view(&shape), detail: view(&detail), curl: view(&curl) });
+        *shared = Some(noise.clone());
+        Ok(noise)
+    }
+
+    pub(crate) fn bindings(&self) -> Bindings<'_> {
+        vec![
+            ("shape_noise", (&self.shape).into()),
+            ("detail_noise", (&self.detail).into()),
+            ("curl_noise", (&self.curl).into()),
+        ]
+    }
+}
+
+/// Bakes a volume with the kernel `entry`, and its mips from it.
+fn volume(ctx: &mut Context<'_>, entry: &str, size: u32) -> Result<wgpu::Texture> {
+    let mips = size.ilog2() + 1;
+    let texture = ctx.gpu.texture(entry, [size; 3], mips);
+    let mip = |level: u32| {
+        texture.create_view(&wgpu::TextureViewDescriptor {
+            base_mip_level: level,
+            mip_level_count: Some(1),
+            ..Default::default()
+        })
+    };
+    let mut work = ctx.gpu.work();
+    let out = mip(0);
+    let mut bindings = ctx.uniforms.bindings();
+    bindings.push(("volume_out", (&out).into()));
+    work.dispatch(&*ctx.gpu.kernel("noise", entry)?, &bindings, [size; 3])?;
+    let downsample = ctx.gpu.kernel("noise", "downsample")?;
+    for level in 1..mips {
+        let (from, to) = (mip(level - 1), mip(level));
+        let bindings = [("volume_in", (&from).into()), ("volume_out", (&to).into())];
+        work.dispatch(&downsample, &bindings, [size >> level; 3])?;
+    }
+    work.submit(ctx.timings, ctx.interrupt)?;
+    Ok(texture)
+}

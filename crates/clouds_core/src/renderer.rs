@@ -1,0 +1,463 @@
+//! The frame, top to bottom.
+
+use std::mem;
+use std::sync::Arc;
+use std::time::Instant;
+
+use glam::DVec3;
+
+use crate::blue_noise;
+use crate::camera::Camera;
+use crate::error::{Error, Result};
+use crate::frame::Frame;
+use crate::gpu::{Gpu, Interrupt, Timings, check_fork};
+use crate::kernel::Kernel;
+use crate::params::{Params, Quality};
+use crate::passes::composite::Composed;
+use crate::passes::high_clouds::HighClouds;
+use crate::passes::march::Marched;
+use crate::passes::noise::Noise;
+use crate::passes::reproject::{History, ORDER, STRIDE};
+use crate::passes::sky::Sky;
+use crate::passes::weather::Weather;
+use crate::passes::{Bindings, Context, Uniforms, composite, march, points, reproject};
+use crate::shader::Linked;
+
+/// Makes pictures of one size with one numerical method on one device.
+pub struct Renderer {
+    gpu: Arc<Gpu>,
+    size: [u32; 2],
+    quality: Quality,
+    world: World,
+    still: Option<Still>,
+    animation: Option<Animation>,
+    march_pace: Pace,
+    pixel_pace: Pace,
+    /// Milliseconds on the GPU by kernel, for the last picture or answer.
+    pub timings: Timings,
+}
+
+/// A picture, row by row.
+#[derive(Clone, Debug, Default)]
+pub struct Picture {
+    /// Four numbers a pixel: radiance and alpha (see [`Renderer::render`]).
+    pub image: Vec<f32>,
+    /// Four numbers a pixel: radiance of the sky without clouds, and 1.
+    pub sky: Vec<f32>,
+    /// Metres to the mean scattering point, -1 where there is none.
+    pub depth: Vec<f32>,
+    /// Density evaluations, primary and light together.
+    pub samples: Vec<u32>,
+}
+
+/// Buffers of the bands of a still, kept from one to the next.
+struct Still {
+    pixels: u64,
+    marched: Marched,
+    composed: Composed,
+}
+
+/// Buffers of whole pictures, and what reprojection remembers of the frame before.
+struct Animation {
+    fresh: Marched,
+    before: History,
+    now: History,
+    composed: Composed,
+    last: Option<Shot>,
+}
+
+struct Shot {
+    camera: Camera,
+    params: Params,
+    time: f64,
+    frame: Frame,
+    /// Frames since the last cut.
+    index: u32,
+}
+
+impl Renderer {
+    /// A renderer of pictures of `width` by `height` pixels on the adapter that `adapter` means: an index or a part of
+    /// a name, or none for the best.
+    pub fn new(width: u32, height: u32, quality: Quality, adapter: Option<&str>) -> Result<Self> {
+        quality.check()?;
+        for (name, value) in [("width", width), ("height", height)] {
+            if !(1..=65536).contains(&value) {
+                return Err(Error::parameter(name, value, "a whole number from 1 to 65536 pixels"));
+            }
+        }
+        let gpu = Gpu::open(adapter)?;
+        let pace = Pace::new(if gpu.info.kind == "cpu" { 3e5 } else { 1e8 });
+        Ok(Self {
+            world: World::new(&gpu),
+            still: None,
+            animation: None,
+            march_pace: pace,
+            pixel_pace: pace,
+            timings: Timings::default(),
+            size: [width, height],
+            quality,
+            gpu,
+        })
+    }
+
+    /// The device.
+    pub fn gpu(&self) -> &Arc<Gpu> {
+        &self.gpu
+    }
+
+    /// Width and height in pixels.
+    pub fn size(&self) -> [u32; 2] {
+        self.size
+    }
+
+    /// A still: finished in one call, without history or noise to wait for.
+    ///
+    /// With `background` the image is the radiance of the whole sky with alpha 1; without it the clouds alone,
+    /// premultiplied, alpha 1 minus their transmittance. `all` fills the other layers of the picture too.
+    pub fn render(
+        &mut self,
+        camera: &Camera,
+        params: &Params,
+        time: f64,
+        background: bool,
+        all: bool,
+        interrupt: Interrupt<'_>,
+    ) -> Result<Picture> {
+        let mut frame = self.begin(camera, params, time)?;
+        frame.background = u32::from(background);
+        let Self { gpu, world, quality, timings, .. } = self;
+        let bound = world.run(gpu, params, &frame, quality, timings, interrupt)?;
+
+        let [width, height] = self.size;
+        let mut picture = Picture::default();
+        while frame.first_row < height {
+            frame.rows = self.march_pace.rows(width, height - frame.first_row);
+            let pixels = u64::from(width) * u64::from(frame.rows);
+            if self.still.as_ref().is_none_or(|still| still.pixels < pixels) {
+                let (marched, composed) = (Marched::new(gpu, pixels), Composed::new(gpu, pixels));
+                self.still = Some(Still { pixels, marched, composed });
+            }
+            let Some(still) = &self.still else { unreachable!("was just made") };
+            bound.uniforms.upload_frame(gpu, &frame);
+
+            let mut work = gpu.work();
+            march::run(gpu, &mut work, &bound.all, &frame, &still.marched)?;
+            composite::run(gpu, &mut work, &bound.all, &frame, &still.marched, &still.composed)?;
+            work.download(&still.composed.image, 0, 16 * pixels);
+            if all {
+                work.download(&still.composed.sky, 0, 16 * pixels);
+                work.download(&still.composed.depth, 0, 4 * pixels);
+                work.download(&still.marched.samples, 0, 4 * pixels);
+            }
+            let started = Instant::now();
+            let downloads = work.submit(timings, interrupt)?;
+            self.march_pace.learn(pixels, started);
+
+            picture.image.extend_from_slice(downloads[0].numbers());
+            if all {
+                picture.sky.extend_from_slice(downloads[1].numbers());
+                picture.depth.extend_from_slice(downloads[2].numbers());
+                picture.samples.extend_from_slice(downloads[3].numbers());
+            }
+            frame.first_row += frame.rows;
+        }
+        Ok(picture)
+    }
+
+    /// The next frame of an animation: a sixteenth of its pixels is marched, the others follow the clouds from the frame
+    /// before. The first frame, and the first after a cut, is a still. Returns what [`Renderer::render`] does.
+    pub fn animate(
+        &mut self,
+        camera: &Camera,
+        params: &Params,
+        time: f64,
+        background: bool,
+        interrupt: Interrupt<'_>,
+    ) -> Result<Vec<f32>> {
+        let mut frame = self.begin(camera, params, time)?;
+        frame.background = u32::from(background);
+        let [width, height] = self.size;
+        let pixels = u64::from(width) * u64::from(height);
+        if 16 * pixels > self.gpu.max_buffer {
+            let most = self.gpu.max_buffer / 16;
+            let size = format!("{width} x {height}");
+            return Err(Error::parameter("width x height", size, format!("at most {most} pixels for animate on this adapter")));
+        }
+        let cells = [width.div_ceil(STRIDE), height.div_ceil(STRIDE)];
+        let Self { gpu, world, quality, timings, .. } = self;
+        let animation = self.animation.get_or_insert_with(|| Animation {
+            fresh: Marched::new(gpu, u64::from(cells[0]) * u64::from(cells[1])),
+            before: History::new(gpu, pixels),
+            now: History::new(gpu, pixels),
+            composed: Composed::new(gpu, pixels),
+            last: None,
+        });
+        // Taken out while the frame is in the making: if it fails, the next one starts anew.
+        let last = animation.last.take().filter(|last| !last.is_cut(camera, params, time));
+        let index = last.as_ref().map_or(0, |last| last.index + 1);
+        if let Some(last) = &last {
+            frame.set_previous(&last.frame, camera.eye - last.camera.eye, params, time - last.time);
+            frame.moving = u32::from(last.camera != *camera || last.params != *params || last.time != time);
+        }
+        // Each round of the sixteen pixels moves the blue noise on by the golden ratio.
+        frame.jitter_shift = (f64::from(index / 16) * 0.618_033_988_749_895).fract() as f32;
+        let bound = world.run(gpu, params, &frame, quality, timings, interrupt)?;
+
+        if last.is_none() {
+            in_bands(&mut self.march_pace, gpu, &bound, &mut frame, [width, height], |frame| {
+                let mut work = gpu.work();
+                march::run(gpu, &mut work, &bound.all, frame, &animation.now.marched)?;
+                work.submit(timings, interrupt).map(drop)
+            })?;
+            gpu.queue.write_buffer(&animation.now.count, 0, bytemuck::cast_slice(&vec![1u32; pixels as usize]));
+        } else {
+            frame.stride = STRIDE;
+            [frame.subpixel_x, frame.subpixel_y] = ORDER[index as usize % 16];
+            frame.march_width = cells[0];
+            in_bands(&mut self.march_pace, gpu, &bound, &mut frame, cells, |frame| {
+                let mut work = gpu.work();
+                march::run(gpu, &mut work, &bound.all, frame, &animation.fresh)?;
+                work.submit(timings, interrupt).map(drop)
+            })?;
+            in_bands(&mut self.pixel_pace, gpu, &bound, &mut frame, [width, height], |frame| {
+                let mut work = gpu.work();
+                let Animation { fresh, before, now, .. } = &*animation;
+                reproject::run(gpu, &mut work, &bound.all, frame, fresh, before, now)?;
+                work.submit(timings, interrupt).map(drop)
+            })?;
+        }
+        let mut image = Vec::with_capacity(4 * pixels as usize);
+        in_bands(&mut self.pixel_pace, gpu, &bound, &mut frame, [width, height], |frame| {
+            let mut work = gpu.work();
+            let (row, rows) = (u64::from(frame.first_row), u64::from(frame.rows));
+            composite::run(gpu, &mut work, &bound.all, frame, &animation.now.marched, &animation.composed)?;
+            work.download(&animation.composed.image, 16 * u64::from(width) * row, 16 * u64::from(width) * rows);
+            image.extend_from_slice(work.submit(timings, interrupt)?[0].numbers());
+            Ok(())
+        })?;
+
+        mem::swap(&mut animation.before, &mut animation.now);
+        animation.last = Some(Shot { camera: *camera, params: params.clone(), time, frame, index });
+        Ok(image)
+    }
+
+    /// Forgets the frame before: the next one of [`Renderer::animate`] is a still.
+    pub fn cut(&mut self) {
+        if let Some(animation) = &mut self.animation {
+            animation.last = None;
+        }
+    }
+
+    /// Extinction in 1/m at world points: the field that [`Renderer::render`] marches.
+    pub fn density(&mut self, at: &[[f64; 3]], params: &Params, time: f64, interrupt: Interrupt<'_>) -> Result<Vec<f32>> {
+        self.ask("extinction_at_points", at, params, time, interrupt)
+    }
+
+    /// The share of direct sunlight that reaches world points through the clouds; 0 where the ground hides the sun.
+    pub fn sun_transmittance(
+        &mut self,
+        at: &[[f64; 3]],
+        params: &Params,
+        time: f64,
+        interrupt: Interrupt<'_>,
+    ) -> Result<Vec<f32>> {
+        self.ask("sun_transmittance_at_points", at, params, time, interrupt)
+    }
+
+    fn ask(
+        &mut self,
+        entry: &str,
+        at: &[[f64; 3]],
+        params: &Params,
+        time: f64,
+        interrupt: Interrupt<'_>,
+    ) -> Result<Vec<f32>> {
+        check_fork()?;
+        let Some(first) = at.first() else { return Ok(Vec::new()) };
+        // Positions go to the GPU relative to the first: f32 keeps millimetres a few kilometres around it.
+        let eye = DVec3::from_array(*first);
+        let camera = Camera::equirect(eye)?;
+        let offset = |p: &[f64; 3]| (DVec3::from_array(*p) - eye).as_vec3().extend(0.0).to_array();
+        let points: Vec<_> = at.iter().map(offset).collect();
+        let kernel = self.gpu.kernel("points", entry)?;
+        let answers = self.run_points(&kernel, &camera, &points, params, time, interrupt)?;
+        Ok(answers.iter().map(|answer| answer[0]).collect())
+    }
+
+    /// The value of a WGSL `expression` of `x: vec4f` for each input, with the shaders named by `imports` in scope and
+    /// the eye at the origin: how tests reach single shader functions.
+    pub fn probe(
+        &mut self,
+        imports: &[String],
+        expression: &str,
+        inputs: &[[f32; 4]],
+        params: &Params,
+        time: f64,
+        interrupt: Interrupt<'_>,
+    ) -> Result<Vec<[f32; 4]>> {
+        check_fork()?;
+        let imports: String = imports.iter().map(|name| format!("#import {name}\n")).collect();
+        let source = format!(
+            "#import bindings\n{imports}@compute @workgroup_size(64)\n\
+             fn probe(@builtin(global_invocation_id) id: vec3u) {{\n\
+             if id.x >= arrayLength(&points) {{ return; }}\nlet x = points[id.x];\n\
+             results[id.x] = vec4f({expression});\n}}\n"
+        );
+        let linked = Linked::from_source(&source).map_err(|error| Error::parameter("imports", error, "shader names"))?;
+        let kernel = Kernel::from_linked(&self.gpu, &linked, "probe")?;
+        let camera = Camera::equirect(DVec3::ZERO)?;
+        self.run_points(&kernel, &camera, inputs, params, time, interrupt)
+    }
+
+    fn run_points(
+        &mut self,
+        kernel: &Kernel,
+        camera: &Camera,
+        points: &[[f32; 4]],
+        params: &Params,
+        time: f64,
+        interrupt: Interrupt<'_>,
+    ) -> Result<Vec<[f32; 4]>> {
+        let frame = self.begin(camera, params, time)?;
+        let Self { gpu, world, quality, timings, .. } = self;
+        let bound = world.run(gpu, params, &frame, quality, timings, interrupt)?;
+        let mut ctx = Context { gpu, uniforms: bound.uniforms, timings, interrupt };
+        points::run(&mut ctx, &bound.all, &frame, kernel, points)
+    }
+
+    /// Checks the arguments of a call and works out its frame.
+    fn begin(&mut self, camera: &Camera, params: &Params, time: f64) -> Result<Frame> {
+        check_fork()?;
+        params.check()?;
+        if !time.is_finite() {
+            return Err(Error::parameter("time", time, "a finite number of seconds"));
+        }
+        self.timings = Timings::default();
+        Ok(Frame::new(camera, params, time, self.size))
+    }
+}
+
+/// Everything that a march can read, on the GPU.
+struct World {
+    uniforms: Uniforms,
+    blue_noise: wgpu::TextureView,
+    noise: Option<Arc<Noise>>,
+    weather: Weather,
+    high_clouds: HighClouds,
+    sky: Sky,
+}
+
+/// The variables of the world, ready to be bound.
+struct Bound<'a> {
+    uniforms: &'a Uniforms,
+    all: Bindings<'a>,
+}
+
+impl World {
+    fn new(gpu: &Gpu) -> Self {
+        let side = blue_noise::SIZE as u32;
+        let texture = gpu.texture("blue_noise", [side, side, 1], 1);
+        let texels: Vec<_> = blue_noise::tile().iter().map(|v| [half::f16::from_f32(*v); 4]).collect();
+        gpu.write_texture(&texture, &texels);
+        Self {
+            uniforms: Uniforms::new(gpu),
+            blue_noise: texture.create_view(&wgpu::TextureViewDescriptor::default()),
+            noise: None,
+            weather: Weather::new(),
+            high_clouds: HighClouds::new(),
+            sky: Sky::new(),
+        }
+    }
+
+    /// Uploads the uniforms and bakes what has changed.
+    fn run(
+        &mut self,
+        gpu: &Gpu,
+        params: &Params,
+        frame: &Frame,
+        quality: &Quality,
+        timings: &mut Timings,
+        interrupt: Interrupt<'_>,
+    ) -> Result<Bound<'_>> {
+        self.uniforms.upload(gpu, params, frame, quality);
+        let mut ctx = Context { gpu, uniforms: &self.uniforms, timings, interrupt };
+
+        let noise = self.noise.insert(Noise::run(&mut ctx, params)?); // once for a seed
+        let weather = self.weather.run(&mut ctx, params)?; // when its block changes
+        let high_clouds = self.high_clouds.run(&mut ctx, params, frame)?; // as they evolve
+        let sky = self.sky.run(&mut ctx, params, frame)?; // when sun, air or altitude change
+
+        let blue_noise = vec![("blue_noise", (&self.blue_noise).into())];
+        let all = [self.uniforms.bindings(), noise.bindings(), weather, high_clouds, sky, blue_noise].concat();
+        Ok(Bound { uniforms: &self.uniforms, all })
+    }
+}
+
+impl Shot {
+    /// Whether what was seen before says nothing about what is seen now.
+    fn is_cut(&self, camera: &Camera, params: &Params, time: f64) -> bool {
+        let (old, new) = (&self.params, params);
+        let turned = camera.forward.dot(self.camera.forward) < 0.8 || camera.up.dot(self.camera.up) < 0.8;
+        let jumped = camera.eye.distance(self.camera.eye) > 2000.0 || (time - self.time).abs() > 300.0;
+        camera.projection != self.camera.projection
+            || (camera.fov / self.camera.fov).ln().abs() > 0.2
+            || turned
+            || jumped
+            || (old.clouds.seed, old.clouds.noise) != (new.clouds.seed, new.clouds.noise)
+            || old.weather != new.weather
+            || old.light.model != new.light.model
+            || old.atmosphere.planet_radius != new.atmosphere.planet_radius
+    }
+}
+
+/// What a submission should take, in seconds: short enough for every GPU's watchdog and for Ctrl-C, long enough that
+/// submitting costs nothing.
+const BAND_SECONDS: f64 = 0.1;
+/// Most pixels of a band: 64 MiB a buffer, half of what lavapipe lets a shader see.
+const BAND_PIXELS: u32 = 1 << 22;
+
+/// How many pixels a second buys, from the bands so far.
+#[derive(Clone, Copy)]
+struct Pace {
+    pixels_per_second: f64,
+}
+
+impl Pace {
+    const fn new(pixels_per_second: f64) -> Self {
+        Self { pixels_per_second }
+    }
+
+    /// Rows of the next band: whole workgroups, at most `left`.
+    fn rows(self, width: u32, left: u32) -> u32 {
+        let pixels = (self.pixels_per_second * BAND_SECONDS).min(f64::from(BAND_PIXELS));
+        let rows = (pixels / f64::from(width)) as u32 / 8 * 8;
+        rows.max(8).min(left)
+    }
+
+    fn learn(&mut self, pixels: u64, started: Instant) {
+        let seen = pixels as f64 / started.elapsed().as_secs_f64().max(1e-6);
+        self.pixels_per_second = seen.clamp(self.pixels_per_second / 4.0, self.pixels_per_second * 4.0);
+    }
+}
+
+/// Runs `submit` for band after band of a picture whose buffers hold all of it.
+fn in_bands(
+    pace: &mut Pace,
+    gpu: &Gpu,
+    bound: &Bound<'_>,
+    frame: &mut Frame,
+    [width, height]: [u32; 2],
+    mut submit: impl FnMut(&Frame) -> Result<()>,
+) -> Result<()> {
+    frame.first_row = 0;
+    while frame.first_row < height {
+        frame.rows = pace.rows(width, height - frame.first_row);
+        frame.buffer_row = frame.first_row;
+        bound.uniforms.upload_frame(gpu, frame);
+        let started = Instant::now();
+        submit(frame)?;
+        pace.learn(u64::from(width) * u64::from(frame.rows), started);
+        frame.first_row += frame.rows;
+    }
+    Ok(())
+}

@@ -1,0 +1,436 @@
+//! How a parameter describes itself: one declaration gives the Rust struct, the bytes and the text of the WGSL
+//! uniform, the Python dataclass, the manual, and the range check.
+
+use std::fmt::{self, Write as _};
+use std::sync::Arc;
+
+use crate::error::{Error, Result};
+
+/// What kind of value a parameter holds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Type {
+    /// A number.
+    F32,
+    /// A whole number from 0.
+    U32,
+    /// A switch; `u32` 0 or 1 in WGSL, where `bool` cannot be shared with the host.
+    Bool,
+    /// Two, three or four numbers.
+    Vector(usize),
+    /// One of a few words; its index is a `u32` in WGSL.
+    Choice(&'static [&'static str]),
+    /// Nothing, or an image of three channels: it reaches the GPU as a texture and not in the uniform.
+    Map,
+}
+
+impl Type {
+    /// Size in 32-bit words of the WGSL uniform.
+    pub const fn words(self) -> usize {
+        match self {
+            Self::F32 | Self::U32 | Self::Bool | Self::Choice(_) => 1,
+            Self::Vector(n) => n,
+            Self::Map => 0,
+        }
+    }
+
+    /// Alignment in bytes (WGSL, section "alignment and size").
+    const fn align(self) -> usize {
+        match self {
+            Self::Vector(2) => 8,
+            Self::Vector(_) => 16,
+            _ => 4,
+        }
+    }
+
+    /// Its name in WGSL.
+    pub fn wgsl(self) -> String {
+        match self {
+            Self::F32 => "f32".into(),
+            Self::Vector(n) => format!("vec{n}f"),
+            Self::U32 | Self::Bool | Self::Choice(_) => "u32".into(),
+            Self::Map => unreachable!("maps are textures"),
+        }
+    }
+}
+
+/// An image of `height` rows of `width` pixels of three channels, row by row.
+#[derive(Clone, PartialEq)]
+pub struct Map {
+    /// Pixels in a row.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// `3 * width * height` numbers.
+    pub data: Vec<f32>,
+}
+
+impl fmt::Debug for Map {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Map({} x {})", self.width, self.height)
+    }
+}
+
+/// A value on its way in or out of a block, before it has the type of its field.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Value {
+    /// A switch.
+    Bool(bool),
+    /// A whole number.
+    Int(i64),
+    /// A number.
+    Float(f64),
+    /// Several numbers.
+    Vector(Vec<f64>),
+    /// A word.
+    Text(String),
+    /// An image.
+    Map(Arc<Map>),
+    /// No image.
+    None,
+}
+
+impl fmt::Display for Value {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Bool(v) => write!(f, "{v}"),
+            Self::Int(v) => write!(f, "{v}"),
+            Self::Float(v) => write!(f, "{v}"),
+            Self::Vector(v) => {
+                let numbers: Vec<_> = v.iter().map(f64::to_string).collect();
+                write!(f, "({})", numbers.join(", "))
+            }
+            Self::Text(v) => write!(f, "{v:?}"),
+            Self::Map(v) => write!(f, "{v:?}"),
+            Self::None => write!(f, "None"),
+        }
+    }
+}
+
+/// What the rest of the world needs to know about one parameter.
+#[derive(Clone, Copy, Debug)]
+pub struct Field {
+    /// Its name, the same in Rust, WGSL and Python.
+    pub name: &'static str,
+    /// One or more sentences.
+    pub doc: &'static str,
+    /// Unit, or nothing.
+    pub unit: &'static str,
+    /// Smallest and largest allowed value (of each component).
+    pub range: (f64, f64),
+    /// Its type.
+    pub ty: Type,
+    /// Where it starts in the WGSL struct of its block, in bytes.
+    pub offset: usize,
+}
+
+impl Field {
+    /// What is allowed, in words.
+    pub fn allowed(&self) -> String {
+        let (min, max) = self.range;
+        let unit = if self.unit.is_empty() { String::new() } else { format!(" {}", self.unit) };
+        match self.ty {
+            Type::F32 => format!("a number from {min} to {max}{unit}"),
+            Type::U32 => format!("a whole number from {min} to {max}{unit}"),
+            Type::Bool => "True or False".into(),
+            Type::Vector(n) => format!("{n} numbers from {min} to {max}{unit}"),
+            Type::Choice(names) => format!("one of {names:?}").replace(['[', ']'], ""),
+            Type::Map => {
+                format!("None or a float array of shape (H, W, 3), H and W from 1 to 8192, values from {min} to {max}")
+            }
+        }
+    }
+
+    /// The value in the type of this field, or an error that names the field, the value and what is allowed.
+    pub fn check(&self, block: &str, value: &Value) -> Result<Value> {
+        let (min, max) = self.range;
+        // Written so that NaN fails it.
+        let in_range = |v: f64| v >= min && v <= max;
+        let number = |v: &Value| match v {
+            Value::Int(v) => Some(*v as f64),
+            Value::Float(v) => Some(*v),
+            _ => None,
+        };
+        let checked = match (self.ty, value) {
+            (Type::F32, v) => number(v).filter(|v| in_range(*v)).map(Value::Float),
+            (Type::U32, Value::Int(v)) => in_range(*v as f64).then_some(Value::Int(*v)),
+            (Type::Bool, Value::Bool(v)) => Some(Value::Bool(*v)),
+            (Type::Vector(n), Value::Vector(v)) => {
+                (v.len() == n && v.iter().all(|v| in_range(*v))).then(|| value.clone())
+            }
+            (Type::Choice(names), Value::Text(v)) => names.contains(&v.as_str()).then(|| value.clone()),
+            (Type::Map, Value::None) => Some(Value::None),
+            (Type::Map, Value::Map(map)) => {
+                let sized = (1..=8192).contains(&map.width) && (1..=8192).contains(&map.height);
+                if let Some(bad) = map.data.iter().find(|v| !in_range(f64::from(**v))) {
+                    return Err(Error::parameter(
+                        &format!("{block}.{}", self.name),
+                        format!("{map:?} with a value of {bad}"),
+                        self.allowed(),
+                    ));
+                }
+                sized.then(|| value.clone())
+            }
+            _ => None,
+        };
+        checked.ok_or_else(|| Error::parameter(&format!("{block}.{}", self.name), value, self.allowed()))
+    }
+}
+
+/// A Rust type that a parameter can have.
+pub trait Typed: Sized {
+    /// What to call it.
+    const TYPE: Type;
+    /// From a value that [`Field::check`] has accepted.
+    fn from_value(value: &Value) -> Option<Self>;
+    /// As a value.
+    fn to_value(&self) -> Value;
+    /// As words of the uniform; `out` has [`Type::words`] of them.
+    fn write(&self, out: &mut [u32]);
+}
+
+impl Typed for f32 {
+    const TYPE: Type = Type::F32;
+    fn from_value(value: &Value) -> Option<Self> {
+        match value {
+            Value::Float(v) => Some(*v as f32),
+            Value::Int(v) => Some(*v as f32),
+            _ => None,
+        }
+    }
+    fn to_value(&self) -> Value {
+        // Through text, so that 0.45 stays 0.45 and does not become 0.44999998807907104.
+        Value::Float(self.to_string().parse().expect("a number prints as a number"))
+    }
+    fn write(&self, out: &mut [u32]) {
+        out[0] = self.to_bits();
+    }
+}
+
+impl Typed for u32 {
+    const TYPE: Type = Type::U32;
+    fn from_value(value: &Value) -> Option<Self> {
+        match value {
+            Value::Int(v) => (*v).try_into().ok(),
+            _ => None,
+        }
+    }
+    fn to_value(&self) -> Value {
+        Value::Int(i64::from(*self))
+    }
+    fn write(&self, out: &mut [u32]) {
+        out[0] = *self;
+    }
+}
+
+impl Typed for bool {
+    const TYPE: Type = Type::Bool;
+    fn from_value(value: &Value) -> Option<Self> {
+        match value {
+            Value::Bool(v) => Some(*v),
+            _ => None,
+        }
+    }
+    fn to_value(&self) -> Value {
+        Value::Bool(*self)
+    }
+    fn write(&self, out: &mut [u32]) {
+        out[0] = u32::from(*self);
+    }
+}
+
+impl<const N: usize> Typed for [f32; N] {
+    const TYPE: Type = Type::Vector(N);
+    fn from_value(value: &Value) -> Option<Self> {
+        match value {
+            Value::Vector(v) => v.iter().map(|v| *v as f32).collect::<Vec<_>>().try_into().ok(),
+            _ => None,
+        }
+    }
+    fn to_value(&self) -> Value {
+        let number = |v: &f32| v.to_string().parse().expect("a number prints as a number");
+        Value::Vector(self.iter().map(number).collect())
+    }
+    fn write(&self, out: &mut [u32]) {
+        for (out, v) in out.iter_mut().zip(self) {
+            *out = v.to_bits();
+        }
+    }
+}
+
+impl Typed for Option<Arc<Map>> {
+    const TYPE: Type = Type::Map;
+    fn from_value(value: &Value) -> Option<Self> {
+        match value {
+            Value::Map(v) => Some(Some(v.clone())),
+            Value::None => Some(None),
+            _ => None,
+        }
+    }
+    fn to_value(&self) -> Value {
+        self.as_ref().map_or(Value::None, |v| Value::Map(v.clone()))
+    }
+    fn write(&self, _out: &mut [u32]) {}
+}
+
+/// A block of parameters: a struct in Rust and WGSL, a dataclass in Python.
+pub trait Block {
+    /// Its type's name.
+    fn type_name(&self) -> &'static str;
+    /// What it holds.
+    fn doc(&self) -> &'static str;
+    /// Its parameters, in order.
+    fn fields(&self) -> &'static [Field];
+    /// The value of one.
+    fn get(&self, index: usize) -> Value;
+    /// Sets one from a value that [`Field::check`] has accepted.
+    fn set(&mut self, index: usize, value: &Value) -> Option<()>;
+    /// Writes the bytes of the WGSL struct; `out` has [`size`] of them, as words.
+    fn write(&self, out: &mut [u32]);
+}
+
+/// Size in bytes of the WGSL struct of a block, rounded up so that the next block can follow it in a uniform.
+pub const fn size(fields: &[Field]) -> usize {
+    let (mut end, mut i) = (0, 0);
+    while i < fields.len() {
+        end = fields[i].offset + 4 * fields[i].ty.words();
+        i += 1;
+    }
+    end.next_multiple_of(16)
+}
+
+/// Lays fields out by WGSL's rule: each starts at the next multiple of its alignment.
+pub const fn layout<const N: usize>(mut fields: [Field; N]) -> [Field; N] {
+    let (mut end, mut i) = (0usize, 0);
+    while i < N {
+        fields[i].offset = end.next_multiple_of(fields[i].ty.align());
+        end = fields[i].offset + 4 * fields[i].ty.words();
+        i += 1;
+    }
+    fields
+}
+
+/// A field's name without the `r#` that lets Rust call a field `type`.
+pub const fn bare(name: &'static str) -> &'static str {
+    match name.as_bytes() {
+        [b'r', b'#', ..] => name.split_at(2).1,
+        _ => name,
+    }
+}
+
+/// Sets the parameter `name` of `block` (called `path` in errors) after checking it.
+pub fn assign(block: &mut dyn Block, path: &str, name: &str, value: &Value) -> Result<()> {
+    let fields = block.fields();
+    let Some(index) = fields.iter().position(|field| field.name == name) else {
+        let names: Vec<_> = fields.iter().map(|field| field.name).collect();
+        return Err(Error::parameter(&format!("{path}.{name}"), value, format!("one of {}", names.join(", "))));
+    };
+    let field = &fields[index];
+    let value = field.check(path, value)?;
+    block.set(index, &value).ok_or_else(|| Error::parameter(&format!("{path}.{name}"), &value, field.allowed()))
+}
+
+/// A field's name in WGSL, where `type` is reserved.
+pub fn wgsl_name(name: &str) -> &str {
+    if name == "type" { "type_" } else { name }
+}
+
+/// The WGSL struct of a block.
+pub fn wgsl_struct(block: &dyn Block) -> String {
+    let mut code = format!("struct {} {{\n", block.type_name());
+    for field in block.fields().iter().filter(|field| field.ty.words() > 0) {
+        let unit = if field.unit.is_empty() { String::new() } else { format!(" [{}]", field.unit) };
+        let _ = writeln!(code, "    {}: {}, //{}{unit}", wgsl_name(field.name), field.ty.wgsl(), field.doc);
+    }
+    code += "}\n";
+    for field in block.fields() {
+        if let Type::Choice(names) = field.ty {
+            for (index, name) in names.iter().enumerate() {
+                let (field, name) = (field.name.to_uppercase(), name.to_uppercase());
+                let _ = writeln!(code, "const {field}_{name} = {index}u;");
+            }
+        }
+    }
+    code
+}
+
+/// Declares a block of parameters. The range may be left out where no user sets the value.
+#[macro_export]
+macro_rules! params {
+    ($($(#[doc = $doc:literal])* $block:ident { $(
+        $(#[doc = $about:literal])*
+        $field:ident: $ty:ty = $default:expr $(, in $min:literal..=$max:literal $unit:literal)?;
+    )* })*) => { $(
+        $(#[doc = $doc])*
+        #[derive(Clone, Debug, PartialEq)]
+        pub struct $block { $( $(#[doc = $about])* pub $field: $ty, )* }
+
+        impl Default for $block {
+            fn default() -> Self { Self { $( $field: $default, )* } }
+        }
+
+        impl $block {
+            /// Its parameters, in order.
+            pub const FIELDS: &'static [$crate::schema::Field] = &$crate::schema::layout([$(
+                $crate::schema::Field {
+                    name: $crate::schema::bare(stringify!($field)),
+                    doc: concat!($($about),*),
+                    unit: concat!($($unit)?),
+                    range: (f64::MIN $(.max($min as f64))?, f64::MAX $(.min($max as f64))?),
+                    ty: <$ty as $crate::schema::Typed>::TYPE,
+                    offset: 0,
+                }
+            ),*]);
+        }
+
+        impl $crate::schema::Block for $block {
+            fn type_name(&self) -> &'static str { stringify!($block) }
+            fn doc(&self) -> &'static str { concat!($($doc),*) }
+            fn fields(&self) -> &'static [$crate::schema::Field] { Self::FIELDS }
+            fn get(&self, index: usize) -> $crate::schema::Value {
+                let getters: &[fn(&Self) -> $crate::schema::Value] =
+                    &[$( |block| $crate::schema::Typed::to_value(&block.$field) ),*];
+                getters[index](self)
+            }
+            fn set(&mut self, index: usize, value: &$crate::schema::Value) -> Option<()> {
+                type Setter = fn(&mut $block, &$crate::schema::Value) -> Option<()>;
+                let setters: &[Setter] = &[$( |block, value| {
+                    block.$field = $crate::schema::Typed::from_value(value)?;
+                    Some(())
+                } ),*];
+                setters[index](self, value)
+            }
+            fn write(&self, out: &mut [u32]) {
+                let mut fields = Self::FIELDS.iter();
+                $(
+                    let field = fields.next().expect("as many fields as the struct has");
+                    let start = field.offset / 4;
+                    $crate::schema::Typed::write(&self.$field, &mut out[start..start + field.ty.words()]);
+                )*
+            }
+        }
+    )* };
+}
+
+/// Declares a parameter type that is one of a few words.
+#[macro_export]
+macro_rules! choice {
+    ($(#[doc = $doc:literal])* $name:ident { $( $(#[doc = $about:literal])* $variant:ident = $word:literal, )* }) => {
+        $(#[doc = $doc])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum $name { $( $(#[doc = $about])* $variant, )* }
+
+        impl $crate::schema::Typed for $name {
+            const TYPE: $crate::schema::Type = $crate::schema::Type::Choice(&[$($word),*]);
+            fn from_value(value: &$crate::schema::Value) -> Option<Self> {
+                match value {
+                    $( $crate::schema::Value::Text(word) if word == $word => Some(Self::$variant), )*
+                    _ => None,
+                }
+            }
+            fn to_value(&self) -> $crate::schema::Value {
+                match self { $( Self::$variant => $crate::schema::Value::Text($word.into()), )* }
+            }
+            fn write(&self, out: &mut [u32]) { out[0] = *self as u32; }
+        }
+    };
+}

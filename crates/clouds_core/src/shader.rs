@@ -1,0 +1,108 @@
+//! WGSL files and how they find each other: `#import name` on a line of its own brings in the whole of a file, once.
+
+use std::collections::HashSet;
+use std::fmt::Write as _;
+
+use crate::frame::Frame;
+use crate::params::{self, Params, Quality};
+use crate::schema::wgsl_struct;
+
+include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
+
+/// One self-contained WGSL module, and where each of its lines came from.
+pub struct Linked {
+    /// The WGSL.
+    pub code: String,
+    lines: Vec<(String, usize)>,
+}
+
+impl Linked {
+    /// Links the file called `root` with all that it imports. WGSL ignores the order of declarations, so importing is
+    /// appending.
+    pub fn new(root: &str) -> Result<Self, String> {
+        let mut linked = Self { code: String::new(), lines: Vec::new() };
+        let source = read(root).ok_or_else(|| format!("no shader named {root:?}"))?;
+        linked.append(root, &source)?;
+        Ok(linked)
+    }
+
+    /// Links `source`, which is no file, with all that it imports.
+    pub fn from_source(source: &str) -> Result<Self, String> {
+        let mut linked = Self { code: String::new(), lines: Vec::new() };
+        linked.append("(source)", source)?;
+        Ok(linked)
+    }
+
+    fn append(&mut self, root: &str, source: &str) -> Result<(), String> {
+        let mut queue = vec![(root.to_owned(), source.to_owned())];
+        let mut seen = HashSet::from([root.to_owned()]);
+        while let Some((file, source)) = queue.pop() {
+            for (number, line) in source.lines().enumerate() {
+                match line.strip_prefix("#import ") {
+                    Some(import) if seen.insert(import.to_owned()) => {
+                        let source = read(import).ok_or_else(|| format!("{file}: no shader named {import:?}"))?;
+                        queue.push((import.to_owned(), source));
+                    }
+                    Some(_) => {}
+                    None => {
+                        self.code += line;
+                        self.code.push('\n');
+                        self.lines.push((file.clone(), number + 1));
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The file and line that line `number` of the linked code came from.
+    pub fn origin(&self, number: usize) -> String {
+        let (file, line) = &self.lines[number - 1];
+        format!("shaders/wgsl/{file}.wgsl:{line}")
+    }
+
+    /// Parses and validates the module; errors name the file and line that the text came from.
+    pub fn parse(&self) -> Result<(wgpu::naga::Module, wgpu::naga::valid::ModuleInfo), String> {
+        use wgpu::naga::{front::wgsl, valid};
+        let module = wgsl::parse_str(&self.code).map_err(|error| {
+            let line = error.location(&self.code).map_or(1, |at| at.line_number as usize);
+            format!("{}: {}", self.origin(line), error.emit_to_string(&self.code))
+        })?;
+        let info = valid::Validator::new(valid::ValidationFlags::all(), valid::Capabilities::default())
+            .validate(&module)
+            .map_err(|error| {
+                let line = error.location(&self.code).map_or(1, |at| at.line_number as usize);
+                format!("{}: {}", self.origin(line), error.emit_to_string(&self.code))
+            })?;
+        Ok((module, info))
+    }
+}
+
+/// The text of a WGSL file. `params` and `frame` are not files: they are written from the one definition of the
+/// parameters, so that they cannot be stale.
+pub fn read(name: &str) -> Option<String> {
+    match name {
+        "params" => Some(params_source()),
+        "frame" => Some(wgsl_struct(&Frame::default())),
+        _ => SHADERS.iter().find(|(file, _)| *file == name).map(|(_, source)| (*source).to_owned()),
+    }
+}
+
+/// Every WGSL file by name.
+pub fn names() -> impl Iterator<Item = &'static str> {
+    SHADERS.iter().map(|(name, _)| *name)
+}
+
+fn params_source() -> String {
+    let mut code = String::new();
+    for (_, block) in Params::default().blocks() {
+        code += &wgsl_struct(block);
+    }
+    code += &wgsl_struct(&Quality::default());
+    code += "struct Params {\n";
+    for (name, type_name, _) in params::uniform_layout().0 {
+        let _ = writeln!(code, "    @align(16) {name}: {type_name},");
+    }
+    code += "}\n";
+    code
+}

@@ -1,0 +1,490 @@
+//! `nubis._nubis`: the renderer for Python. Thin: it turns Python values into the core's and back.
+
+mod convert;
+
+use std::cell::RefCell;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::PathBuf;
+use std::sync::Mutex;
+
+use clouds_core::camera::{Camera as CoreCamera, Convention, Projection};
+use clouds_core::gpu::{self, lock};
+use clouds_core::params::{Params, Quality};
+use clouds_core::renderer::Renderer as CoreRenderer;
+use clouds_core::{Error, Result, color, files, params, schema};
+use glam::DVec3;
+use numpy::{PyArray1, PyArrayMethods as _, PyReadonlyArrayDyn, PyUntypedArrayMethods as _};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyTuple};
+
+use convert::{
+    number_from_python, params_from_python, quality_from_python, value_from_python, value_to_python, vector_from_python,
+};
+
+/// The exception of the package that an error of the core becomes.
+fn exception(py: Python<'_>, error: &Error) -> PyErr {
+    let name = match error {
+        Error::Parameter(_) => "ParameterError",
+        Error::Adapter(_) => "AdapterError",
+        Error::Device(_) | Error::Interrupted => "DeviceError",
+        Error::Fork => "ForkError",
+        Error::File(_) => "FileError",
+    };
+    match py.import("nubis._errors").and_then(|module| module.getattr(name)?.call1((error.to_string(),))) {
+        Ok(value) => PyErr::from_value(value),
+        Err(error) => error,
+    }
+}
+
+fn raise<T>(py: Python<'_>, result: Result<T>) -> PyResult<T> {
+    result.map_err(|error| exception(py, &error))
+}
+
+/// Runs `work` without the GIL. It is handed a check for Ctrl-C; no panic leaves it.
+fn detached<T: Send>(py: Python<'_>, work: impl FnOnce(gpu::Interrupt<'_>) -> Result<T> + Send) -> PyResult<T> {
+    let (result, interrupt) = py.detach(|| {
+        let raised = RefCell::new(None);
+        let interrupt = || {
+            Python::attach(|py| py.check_signals()).map_err(|error| {
+                *raised.borrow_mut() = Some(error);
+                Error::Interrupted
+            })
+        };
+        let result = catch_unwind(AssertUnwindSafe(|| work(&interrupt)));
+        let result = result.unwrap_or_else(|panic| {
+            let message = panic.downcast_ref::<String>().map(String::as_str);
+            let message = message.or(panic.downcast_ref::<&str>().copied()).unwrap_or("unknown");
+            Err(Error::Device(format!("internal error, please report it: {message}")))
+        });
+        (result, raised.into_inner())
+    });
+    match interrupt {
+        Some(error) => Err(error),
+        None => raise(py, result),
+    }
+}
+
+fn vector(v: [f64; 3]) -> DVec3 {
+    DVec3::from_array(v)
+}
+
+fn fov_y_or_default(fov_y: Option<&Bound<'_, PyAny>>) -> PyResult<f64> {
+    fov_y.map_or(Ok(60.0), |fov_y| number_from_python("fov_y", fov_y))
+}
+
+/// A camera: see `Camera.look_at`, `from_matrix`, `equirect` and `fisheye`.
+#[pyclass(frozen, eq, from_py_object, module = "nubis")]
+#[derive(Clone, Copy, PartialEq)]
+struct Camera(CoreCamera);
+
+type CameraState = (u8, [f64; 3], [f64; 3], [f64; 3], [f64; 3], f64);
+
+#[pymethods]
+impl Camera {
+    /// A pinhole camera.
+    ///
+    /// Parameters
+    /// ----------
+    /// eye : (3,) floats
+    ///     Position in world metres (x east, y north, z up).
+    /// target : (3,) floats
+    ///     A point in the middle of the picture.
+    /// up : (3,) floats
+    ///     A direction that is up in the picture.
+    /// fov_y : float
+    ///     Vertical field of view in degrees, above 0 and at most 179.
+    #[staticmethod]
+    #[pyo3(signature = (eye, target, up=None, fov_y=None))]
+    fn look_at(
+        eye: &Bound<'_, PyAny>,
+        target: &Bound<'_, PyAny>,
+        up: Option<&Bound<'_, PyAny>>,
+        fov_y: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let py = eye.py();
+        let (eye, target) = (vector_from_python("eye", eye)?, vector_from_python("target", target)?);
+        let up = up.map_or(Ok(DVec3::Z), |up| vector_from_python("up", up))?;
+        raise(py, CoreCamera::look_at(eye, target, up, fov_y_or_default(fov_y)?)).map(Self)
+    }
+
+    /// A pinhole camera from a matrix.
+    ///
+    /// Parameters
+    /// ----------
+    /// world_from_camera : (4, 4) floats
+    ///     Takes camera coordinates to world metres; a rigid motion.
+    /// fov_y : float
+    ///     Vertical field of view in degrees, above 0 and at most 179.
+    /// convention : {"opengl", "opencv"}
+    ///     The camera's axes: +x right, +y up, looking down -z; or +x right, +y down, looking down +z.
+    #[staticmethod]
+    #[pyo3(signature = (world_from_camera, fov_y=None, convention="opengl"))]
+    fn from_matrix(
+        world_from_camera: &Bound<'_, PyAny>,
+        fov_y: Option<&Bound<'_, PyAny>>,
+        convention: &str,
+    ) -> PyResult<Self> {
+        let py = world_from_camera.py();
+        let rows = world_from_camera.extract::<[[f64; 4]; 4]>().map_err(|_| {
+            let given = world_from_camera.str().map_or_else(|_| "?".into(), |text| text.to_string());
+            exception(py, &Error::parameter("world_from_camera", given, "a 4 x 4 matrix of numbers"))
+        })?;
+        let convention = match convention {
+            "opengl" => Convention::OpenGl,
+            "opencv" => Convention::OpenCv,
+            _ => {
+                let given = format!("{convention:?}");
+                return Err(exception(py, &Error::parameter("convention", given, "\"opengl\" or \"opencv\"")));
+            }
+        };
+        raise(py, CoreCamera::from_matrix(rows, fov_y_or_default(fov_y)?, convention)).map(Self)
+    }
+
+    /// The whole sphere around `eye` by longitude and latitude.
+    ///
+    /// The image's centre is north, right is clockwise seen from above (east), its top row the zenith. Twice as wide
+    /// as high gives square pixels.
+    #[staticmethod]
+    fn equirect(eye: &Bound<'_, PyAny>) -> PyResult<Self> {
+        raise(eye.py(), CoreCamera::equirect(vector_from_python("eye", eye)?)).map(Self)
+    }
+
+    /// An equidistant all-sky camera.
+    ///
+    /// The image's centre is `up`, its top as far north as can be; as on a photograph of the sky, east is on the left.
+    /// `fov` degrees span the shorter side; outside that circle pixels are 0 with alpha 0.
+    #[staticmethod]
+    #[pyo3(signature = (eye, up=None, fov=None))]
+    fn fisheye(
+        eye: &Bound<'_, PyAny>,
+        up: Option<&Bound<'_, PyAny>>,
+        fov: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let py = eye.py();
+        let up = up.map_or(Ok(DVec3::Z), |up| vector_from_python("up", up))?;
+        let fov = fov.map_or(Ok(180.0), |fov| number_from_python("fov", fov))?;
+        raise(py, CoreCamera::fisheye(vector_from_python("eye", eye)?, up, fov)).map(Self)
+    }
+
+    #[getter]
+    fn kind(&self) -> &'static str {
+        match self.0.projection {
+            Projection::Perspective => "perspective",
+            Projection::Equirect => "equirect",
+            Projection::Fisheye => "fisheye",
+        }
+    }
+
+    #[getter]
+    fn eye(&self) -> (f64, f64, f64) {
+        self.0.eye.into()
+    }
+
+    #[getter]
+    fn forward(&self) -> (f64, f64, f64) {
+        self.0.forward.into()
+    }
+
+    #[getter]
+    fn up(&self) -> (f64, f64, f64) {
+        self.0.up.into()
+    }
+
+    #[getter]
+    fn right(&self) -> (f64, f64, f64) {
+        self.0.right.into()
+    }
+
+    #[getter]
+    fn fov(&self) -> f64 {
+        self.0.fov
+    }
+
+    /// The 4 x 4 matrix that takes camera coordinates (OpenGL) to world coordinates, by rows.
+    fn matrix(&self) -> [[f64; 4]; 4] {
+        self.0.matrix()
+    }
+
+    fn __repr__(&self) -> String {
+        let (e, f) = (self.0.eye, self.0.forward);
+        format!(
+            "Camera(kind={:?}, eye=({}, {}, {}), forward=({}, {}, {}), fov={})",
+            self.kind(),
+            e.x,
+            e.y,
+            e.z,
+            f.x,
+            f.y,
+            f.z,
+            self.0.fov
+        )
+    }
+
+    fn __hash__(&self) -> u64 {
+        let c = &self.0;
+        let numbers = [c.eye, c.right, c.up, c.forward].map(|v| v.to_array());
+        // FNV-1a over the bits; -0.0 equals 0.0, so it hashes as it.
+        let bits = numbers.iter().flatten().chain([&c.fov]).map(|v| (v + 0.0).to_bits());
+        bits.fold(c.projection as u64 ^ 0xcbf2_9ce4_8422_2325, |hash, v| (hash ^ v).wrapping_mul(0x0100_0000_01b3))
+    }
+
+    #[staticmethod]
+    fn _restore(state: CameraState) -> Self {
+        let (kind, eye, right, up, forward, fov) = state;
+        let projection = [Projection::Perspective, Projection::Equirect, Projection::Fisheye][usize::from(kind % 3)];
+        let (eye, right, up, forward) = (vector(eye), vector(right), vector(up), vector(forward));
+        Self(CoreCamera { projection, eye, right, up, forward, fov })
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (CameraState,))> {
+        let c = slf.get().0;
+        let axes = [c.eye, c.right, c.up, c.forward].map(|v| v.to_array());
+        let state = (c.projection as u8, axes[0], axes[1], axes[2], axes[3], c.fov);
+        Ok((slf.get_type().getattr("_restore")?, (state,)))
+    }
+}
+
+/// A float32 array of `shape` that takes over `data` without a copy.
+fn array<'py, T: numpy::Element>(py: Python<'py>, data: Vec<T>, shape: &[usize]) -> PyResult<Bound<'py, PyAny>> {
+    Ok(PyArray1::from_vec(py, data).reshape(shape.to_vec())?.into_any())
+}
+
+/// World points of shape (N, 3) from any array-like.
+fn points_from_python(py: Python<'_>, points: &Bound<'_, PyAny>) -> PyResult<Vec<[f64; 3]>> {
+    let numpy = py.import("numpy")?;
+    let kwargs = PyDict::new(py);
+    kwargs.set_item("dtype", "float64")?;
+    let allowed = "an array of finite numbers of shape (N, 3), world metres within 2e8 of the origin";
+    let refuse = |what: String| exception(py, &Error::parameter("points", what, allowed));
+    let points = numpy
+        .call_method("ascontiguousarray", (points,), Some(&kwargs))
+        .map_err(|error| refuse(error.value(py).to_string()))?;
+    let points: PyReadonlyArrayDyn<'_, f64> = points.extract()?;
+    if points.shape().len() != 2 || points.shape()[1] != 3 {
+        return Err(refuse(format!("an array of shape {:?}", points.shape())));
+    }
+    let numbers = points.as_slice()?;
+    if let Some(bad) = numbers.iter().find(|v| v.is_nan() || v.abs() > 2e8) {
+        return Err(refuse(format!("an array with {bad}")));
+    }
+    Ok(numbers.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect())
+}
+
+#[pyclass(frozen, module = "nubis._nubis")]
+struct Renderer {
+    core: Mutex<CoreRenderer>,
+    width: u32,
+    height: u32,
+}
+
+impl Renderer {
+    fn shape(&self, channels: &[usize]) -> Vec<usize> {
+        [&[self.height as usize, self.width as usize], channels].concat()
+    }
+}
+
+#[pymethods]
+impl Renderer {
+    #[new]
+    fn new(py: Python<'_>, width: u32, height: u32, quality: &Bound<'_, PyAny>, adapter: Option<String>) -> PyResult<Self> {
+        let quality: Quality = quality_from_python(quality)?;
+        let core = detached(py, move |_| CoreRenderer::new(width, height, quality, adapter.as_deref()))?;
+        Ok(Self { core: Mutex::new(core), width, height })
+    }
+
+    fn render<'py>(
+        &self,
+        py: Python<'py>,
+        camera: Camera,
+        params: &Bound<'_, PyAny>,
+        time: f64,
+        background: bool,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let params: Params = params_from_python(params)?;
+        let picture = detached(py, |interrupt| {
+            lock(&self.core).render(&camera.0, &params, time, background, false, interrupt)
+        })?;
+        array(py, picture.image, &self.shape(&[4]))
+    }
+
+    fn render_layers<'py>(
+        &self,
+        py: Python<'py>,
+        camera: Camera,
+        params: &Bound<'_, PyAny>,
+        time: f64,
+    ) -> PyResult<Bound<'py, PyTuple>> {
+        let params: Params = params_from_python(params)?;
+        let picture =
+            detached(py, |interrupt| lock(&self.core).render(&camera.0, &params, time, false, true, interrupt))?;
+        let image = array(py, picture.image, &self.shape(&[4]))?;
+        let sky = array(py, picture.sky, &self.shape(&[4]))?;
+        let depth = array(py, picture.depth, &self.shape(&[]))?;
+        let samples = array(py, picture.samples, &self.shape(&[]))?;
+        (image, sky, depth, samples).into_pyobject(py)
+    }
+
+    fn animate<'py>(
+        &self,
+        py: Python<'py>,
+        camera: Camera,
+        params: &Bound<'_, PyAny>,
+        time: f64,
+        background: bool,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let params: Params = params_from_python(params)?;
+        let image =
+            detached(py, |interrupt| lock(&self.core).animate(&camera.0, &params, time, background, interrupt))?;
+        array(py, image, &self.shape(&[4]))
+    }
+
+    fn cut(&self, py: Python<'_>) {
+        py.detach(|| lock(&self.core).cut());
+    }
+
+    fn density<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'_, PyAny>,
+        params: &Bound<'_, PyAny>,
+        time: f64,
+    ) -> PyResult<Bound<'py, PyArray1<f32>>> {
+        let points = points_from_python(py, points)?;
+        let params: Params = params_from_python(params)?;
+        let answers = detached(py, |interrupt| lock(&self.core).density(&points, &params, time, interrupt))?;
+        Ok(PyArray1::from_vec(py, answers))
+    }
+
+    fn sun_transmittance<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'_, PyAny>,
+        params: &Bound<'_, PyAny>,
+        time: f64,
+    ) -> PyResult<Bound<'py, PyArray1<f32>>> {
+        let points = points_from_python(py, points)?;
+        let params: Params = params_from_python(params)?;
+        let answers = detached(py, |interrupt| lock(&self.core).sun_transmittance(&points, &params, time, interrupt))?;
+        Ok(PyArray1::from_vec(py, answers))
+    }
+
+    fn probe<'py>(
+        &self,
+        py: Python<'py>,
+        imports: Vec<String>,
+        expression: &str,
+        inputs: Vec<[f32; 4]>,
+        params: &Bound<'_, PyAny>,
+        time: f64,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let params: Params = params_from_python(params)?;
+        let answers = detached(py, |interrupt| {
+            lock(&self.core).probe(&imports, expression, &inputs, &params, time, interrupt)
+        })?;
+        let count = answers.len();
+        array(py, answers.into_flattened(), &[count, 4])
+    }
+
+    fn timings(&self, py: Python<'_>) -> Vec<(String, f64)> {
+        py.detach(|| lock(&self.core).timings.0.clone())
+    }
+
+    fn adapter<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let info = py.detach(|| lock(&self.core).gpu().info.clone());
+        adapter_to_python(py, &info)
+    }
+}
+
+fn adapter_to_python<'py>(py: Python<'py>, info: &clouds_core::AdapterInfo) -> PyResult<Bound<'py, PyDict>> {
+    let dict = PyDict::new(py);
+    dict.set_item("name", &info.name)?;
+    dict.set_item("driver", &info.driver)?;
+    dict.set_item("backend", &info.backend)?;
+    dict.set_item("kind", &info.kind)?;
+    dict.set_item("pci", &info.pci)?;
+    Ok(dict)
+}
+
+#[pyfunction]
+fn adapters(py: Python<'_>) -> PyResult<Vec<Bound<'_, PyDict>>> {
+    let infos = detached(py, |_| gpu::adapters())?;
+    infos.iter().map(|info| adapter_to_python(py, info)).collect()
+}
+
+/// The value in the type that the field `name` of the block class `type_name` holds, or `ParameterError`.
+#[pyfunction]
+fn check<'py>(
+    py: Python<'py>,
+    type_name: &str,
+    path: &str,
+    name: &str,
+    value: &Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let block = params::block(type_name).expect("the classes are generated from the blocks");
+    let field = block.fields().iter().find(|field| field.name == name).expect("so are their fields");
+    let value = raise(py, field.check(path, &value_from_python(value)?))?;
+    value_to_python(py, &value)
+}
+
+/// Checks what no single field can: `clouds.top` above `clouds.base`, and the like.
+#[pyfunction]
+fn check_params(params: &Bound<'_, PyAny>) -> PyResult<()> {
+    let py = params.py();
+    raise(py, params_from_python(params)?.check())
+}
+
+#[pyfunction]
+fn check_quality(quality: &Bound<'_, PyAny>) -> PyResult<()> {
+    raise(quality.py(), quality_from_python(quality)?.check())
+}
+
+/// The fields of the named numerical method.
+#[pyfunction]
+fn quality<'py>(py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyDict>> {
+    let quality = raise(py, Quality::named(name))?;
+    let block: &dyn schema::Block = &quality;
+    let dict = PyDict::new(py);
+    for (index, field) in block.fields().iter().enumerate() {
+        dict.set_item(field.name, value_to_python(py, &block.get(index))?)?;
+    }
+    Ok(dict)
+}
+
+#[pyfunction]
+fn to_srgb8<'py>(
+    py: Python<'py>,
+    frame: PyReadonlyArrayDyn<'py, f32>,
+    exposure: f32,
+    tonemap: &str,
+) -> PyResult<Bound<'py, PyAny>> {
+    let shape = frame.shape().to_vec();
+    let pixels = raise(py, color::to_srgb8(frame.as_slice()?, shape[2], exposure, tonemap))?;
+    array(py, pixels, &shape)
+}
+
+#[pyfunction]
+fn write_png(py: Python<'_>, path: PathBuf, frame: PyReadonlyArrayDyn<'_, u8>) -> PyResult<()> {
+    let shape = frame.shape();
+    raise(py, files::write_png(&path, frame.as_slice()?, [shape[1], shape[0]], shape[2]))
+}
+
+#[pyfunction]
+fn write_exr(py: Python<'_>, path: PathBuf, frame: PyReadonlyArrayDyn<'_, f32>) -> PyResult<()> {
+    let shape = frame.shape();
+    raise(py, files::write_exr(&path, frame.as_slice()?, [shape[1], shape[0]], shape[2]))
+}
+
+#[pyfunction]
+fn write_hdr(py: Python<'_>, path: PathBuf, frame: PyReadonlyArrayDyn<'_, f32>) -> PyResult<()> {
+    let shape = frame.shape();
+    raise(py, files::write_hdr(&path, frame.as_slice()?, [shape[1], shape[0]], shape[2]))
+}
+
+#[pymodule]
+mod _nubis {
+    #[pymodule_export]
+    use super::{
+        Camera, Renderer, adapters, check, check_params, check_quality, quality, to_srgb8, write_exr, write_hdr,
+        write_png,
+    };
+}

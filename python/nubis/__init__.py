@@ -1,0 +1,63 @@
+"""Volumetric clouds: fast, accurate, on any Vulkan device or none.
+
+    import nubis
+
+    camera = nubis.Camera.look_at(eye=(0, 0, 2), target=(0, 1000, 400), fov_y=60.0)
+    frame = nubis.Renderer(960, 540).render(camera, nubis.Params())
+    nubis.save("sky.png", frame)
+
+World: right-handed metres, x east, y north, z up, z = 0 at sea level under the origin. Angles are
+degrees, time is seconds. Frames are float32, scene-linear, with Rec. 709 primaries.
+"""
+
+from nubis._errors import (
+    AdapterError,
+    DeviceError,
+    FileError,
+    ForkError,
+    NubisError,
+    ParameterError,
+)
+from nubis._image import save, to_srgb8
+from nubis._nubis import Camera
+from nubis._renderer import Adapter, Renderer, adapters, quality
+from nubis._scenes import scenes
+from nubis.params import (
+    Atmosphere,
+    Clouds,
+    HighClouds,
+    Light,
+    Params,
+    Quality,
+    Sun,
+    Weather,
+    Wind,
+)
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "Adapter",
+    "AdapterError",
+    "Atmosphere",
+    "Camera",
+    "Clouds",
+    "DeviceError",
+    "FileError",
+    "ForkError",
+    "HighClouds",
+    "Light",
+    "NubisError",
+    "ParameterError",
+    "Params",
+    "Quality",
+    "Renderer",
+    "Sun",
+    "Weather",
+    "Wind",
+    "adapters",
+    "quality",
+    "save",
+    "scenes",
+    "to_srgb8",
+]

@@ -1,0 +1,149 @@
+"""What all parameter classes share: checking, comparing, replacing, and files."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, ClassVar, Self
+
+import numpy as np
+import tomli_w
+
+from nubis import _nubis
+from nubis._errors import ParameterError
+
+
+class Base:
+    """A frozen dataclass that compares by value, arrays included."""
+
+    __dataclass_fields__: ClassVar[dict[str, dataclasses.Field[Any]]]
+
+    def replace(self, **changes: Any) -> Self:
+        """Return a copy with some fields changed."""
+        names = [f.name for f in dataclasses.fields(self)]
+        for name, value in changes.items():
+            if name not in names:
+                raise _unknown(f"{type(self).__name__}.{name}", value, names)
+        return dataclasses.replace(self, **changes)
+
+    def _key(self) -> tuple[Any, ...]:
+        values = (getattr(self, f.name) for f in dataclasses.fields(self))
+        return tuple(
+            (v.shape, v.tobytes()) if isinstance(v, np.ndarray) else v for v in values
+        )
+
+    def __eq__(self, other: object) -> bool:
+        if type(other) is not type(self):
+            return NotImplemented
+        return self._key() == other._key()
+
+    def __hash__(self) -> int:
+        return hash((type(self).__name__, self._key()))
+
+
+class Block(Base):
+    """A group of parameters. Every value is checked when it is made."""
+
+    def __post_init__(self) -> None:
+        name = type(self).__name__
+        path = "".join("_" + c.lower() if c.isupper() else c for c in name).lstrip("_")
+        for field in dataclasses.fields(self):
+            value = _nubis.check(name, path, field.name, getattr(self, field.name))
+            object.__setattr__(self, field.name, value)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values by field name; arrays as nested lists."""
+        values = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
+        return {
+            k: v.tolist() if isinstance(v, np.ndarray) else list(v) if isinstance(v, tuple) else v
+            for k, v in values.items()
+        }
+
+
+class Root(Base):
+    """All groups of parameters together."""
+
+    def __post_init__(self) -> None:
+        for field in dataclasses.fields(self):
+            value = getattr(self, field.name)
+            wanted = field.default_factory
+            if not (isinstance(wanted, type) and isinstance(value, wanted)):
+                allowed = getattr(wanted, "__name__", "?")
+                raise ParameterError(
+                    f"{field.name} = {value!r} is not allowed: it must be a nubis.{allowed}"
+                )
+        _nubis.check_params(self)
+
+    def with_(self, **changes: Any) -> Self:
+        """Return a copy with deep fields changed: ``with_(**{"clouds.coverage": 0.7})``."""
+        blocks: dict[str, dict[str, Any]] = {}
+        groups = [f.name for f in dataclasses.fields(self)]
+        for path, value in changes.items():
+            block, _, name = path.partition(".")
+            if block not in groups or not name:
+                raise _unknown(path, value, [f"{group}.<field>" for group in groups])
+            blocks.setdefault(block, {})[name] = value
+        new = {}
+        for block, fields in blocks.items():
+            old = getattr(self, block)
+            names = [f.name for f in dataclasses.fields(old)]
+            for name, value in fields.items():
+                if name not in names:
+                    raise _unknown(f"{block}.{name}", value, [f"{block}.{n}" for n in names])
+            new[block] = old.replace(**fields)
+        return self.replace(**new)
+
+    def to_dict(self) -> dict[str, dict[str, Any]]:
+        """Return plain values by group and field name; arrays as nested lists."""
+        return {f.name: getattr(self, f.name).to_dict() for f in dataclasses.fields(self)}
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Mapping[str, Any]]) -> Self:
+        """Make parameters from what `to_dict` returned; fields left out have their defaults."""
+        if not isinstance(values, Mapping):
+            raise ParameterError(f"values = {values!r} is not allowed: it must be a mapping")
+        changes = {}
+        for block, fields in values.items():
+            if not isinstance(fields, Mapping):
+                raise ParameterError(f"{block} = {fields!r} is not allowed: it must be a table")
+            for name, value in fields.items():
+                deep = isinstance(value, list) and value and isinstance(value[0], list)
+                changes[f"{block}.{name}"] = _array(block, name, value) if deep else value
+        return cls().with_(**changes)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write all parameters to a TOML file."""
+        tables = {
+            block: {name: value for name, value in fields.items() if value is not None}
+            for block, fields in self.to_dict().items()
+        }
+        Path(path).write_text(tomli_w.dumps(tables), encoding="utf-8")
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Self:
+        """Read parameters from a TOML file; fields left out have their defaults."""
+        try:
+            values = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+            raise ParameterError(
+                f"path = {os.fspath(path)!r} is not allowed: it must be a TOML file ({error})"
+            ) from error
+        return cls.from_dict(values)
+
+
+def _array(block: str, name: str, value: list[Any]) -> np.ndarray[Any, Any]:
+    try:
+        return np.array(value, dtype=np.float32)
+    except (TypeError, ValueError) as error:
+        raise ParameterError(
+            f"{block}.{name} = (nested lists) is not allowed: they must form an array ({error})"
+        ) from error
+
+
+def _unknown(path: str, value: Any, names: list[str]) -> ParameterError:
+    return ParameterError(
+        f"{path} = {value!r} is not allowed: there is no such field, only {', '.join(names)}"
+    )

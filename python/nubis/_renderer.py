@@ -1,0 +1,315 @@
+"""The renderer that users call."""
+
+from __future__ import annotations
+
+import operator
+import os
+import warnings
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from nubis import _nubis
+from nubis._errors import ParameterError
+from nubis._nubis import Camera
+from nubis.params import Params, Quality
+
+Frame = npt.NDArray[np.float32]
+Shot = tuple[Camera, Params, float]
+Background = Literal["sky"] | None
+
+_warned = False
+
+
+class Adapter(NamedTuple):
+    """A device that can render.
+
+    Attributes
+    ----------
+    name, driver, backend : str
+        As the driver gives them; the backend is ``"vulkan"``, ``"metal"`` or ``"dx12"``.
+    kind : str
+        ``"discrete"``, ``"integrated"``, ``"virtual"``, ``"cpu"`` or ``"other"``.
+    pci : str
+        PCI bus address, empty where there is none.
+    """
+
+    name: str
+    driver: str
+    backend: str
+    kind: str
+    pci: str
+
+
+def adapters() -> list[Adapter]:
+    """Return the adapters that can be used, best first; an index into them chooses one."""
+    return [Adapter(**adapter) for adapter in _nubis.adapters()]
+
+
+def quality(name: str) -> Quality:
+    """Return the numerical method of that name, to look at or to change.
+
+    Names: ``"draft"``, ``"balanced"``, ``"high"``, and the published settings of the sources,
+    ``"nubis2015"``, ``"thesis2018"``, ``"vsu2022"``.
+    """
+    if not isinstance(name, str):
+        raise ParameterError(f"quality = {name!r} is not allowed: it must be a name or a Quality")
+    return Quality(**_nubis.quality(name))
+
+
+class Renderer:
+    """Makes pictures of one size with one numerical method.
+
+    Parameters
+    ----------
+    width, height : int
+        Size of the pictures in pixels, 1 to 65536.
+    quality : str or Quality
+        The numerical method, never the look: a name (see `quality`) or your own.
+    adapter : int or str, optional
+        Which device: an index into `adapters()`, a kind such as ``"cpu"``, or part of a name,
+        driver or PCI address. Without it the environment variable ``NUBIS_ADAPTER`` says the
+        same, and without that the best is taken: hardware first, else software with a warning.
+
+    Raises
+    ------
+    ParameterError
+        For a size or quality that is not allowed.
+    AdapterError
+        When there is no such adapter; lists those found.
+    ForkError
+        In a forked child of a process that has used the GPU.
+    """
+
+    def __init__(
+        self,
+        width: int,
+        height: int,
+        *,
+        quality: str | Quality = "balanced",
+        adapter: int | str | None = None,
+    ) -> None:
+        self._quality = quality if isinstance(quality, Quality) else _named(quality)
+        if adapter is not None and (isinstance(adapter, bool) or not isinstance(adapter, int | str)):
+            raise ParameterError(
+                f"adapter = {adapter!r} is not allowed: it must be an index or a part of a name"
+            )
+        size = _size("width", width), _size("height", height)
+        _nubis.check_quality(self._quality)
+        wanted = os.environ.get("NUBIS_ADAPTER") if adapter is None else str(adapter)
+        self._core = _nubis.Renderer(*size, self._quality, wanted or None)
+        self._size = size
+        if not wanted:
+            _warn_once(self.adapter)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of the pictures in pixels."""
+        return self._size
+
+    @property
+    def quality(self) -> Quality:
+        """The numerical method."""
+        return self._quality
+
+    @property
+    def adapter(self) -> Adapter:
+        """The device that renders."""
+        return Adapter(**self._core.adapter())
+
+    @property
+    def timings(self) -> dict[str, float]:
+        """Milliseconds on the GPU by pass, for the last picture or answer.
+
+        Bakes appear only when they ran. Empty on adapters without timestamps.
+        """
+        return dict(self._core.timings())
+
+    def render(
+        self,
+        camera: Camera,
+        params: Params,
+        *,
+        time: float = 0.0,
+        background: Background = "sky",
+    ) -> Frame:
+        """Return a still, finished in one call: no history, no noise to wait for.
+
+        Parameters
+        ----------
+        camera : Camera
+        params : Params
+        time : float
+            Seconds, of any size: where the wind has carried the clouds.
+        background : {"sky", None}
+            ``"sky"``: the radiance of the whole sky, alpha 1. None: the clouds alone as seen
+            through the air, premultiplied, alpha = 1 - transmittance.
+
+        Returns
+        -------
+        frame : array of float32, shape (height, width, 4)
+            Scene-linear radiance with Rec. 709 primaries, never clipped; row 0 is the top.
+
+        Raises
+        ------
+        ParameterError
+            Before any GPU work.
+        DeviceError
+            When the device is lost or out of memory.
+        """
+        self._check(camera, params)
+        frame: Frame = self._core.render(camera, params, _time(time), _sky(background))
+        return frame
+
+    def render_layers(
+        self, camera: Camera, params: Params, *, time: float = 0.0
+    ) -> dict[str, npt.NDArray[Any]]:
+        """Return a still with all that is known of each pixel.
+
+        Returns
+        -------
+        layers : dict of arrays
+            - ``radiance`` float32 (height, width, 3): the clouds seen through the air,
+              premultiplied; ``radiance + transmittance * sky`` is the picture.
+            - ``transmittance`` float32 (height, width): of all clouds, 0 to 1.
+            - ``depth`` float32 (height, width): metres to the clouds' mean scattering point,
+              inf where there are none.
+            - ``samples`` uint32 (height, width): density evaluations, primary and light together.
+            - ``sky`` float32 (height, width, 3): radiance of the sky without clouds.
+        """
+        self._check(camera, params)
+        image, sky, depth, samples = self._core.render_layers(camera, params, _time(time))
+        depth[depth < 0] = np.inf
+        return {
+            "radiance": np.ascontiguousarray(image[..., :3]),
+            "transmittance": 1 - image[..., 3],
+            "depth": depth,
+            "samples": samples,
+            "sky": np.ascontiguousarray(sky[..., :3]),
+        }
+
+    def animate(
+        self,
+        shots: Iterable[Shot],
+        *,
+        background: Background = "sky",
+        progress: Callable[[Iterable[Shot]], Iterable[Shot]] | None = None,
+    ) -> Iterator[Frame]:
+        """Yield a frame for each shot, with temporal reprojection between consecutive ones.
+
+        One pixel in sixteen is marched per frame, the others follow the clouds from the frame
+        before; the first frame and the first after a cut are stills. A static shot converges to
+        the still, and beyond it to less noise.
+
+        Parameters
+        ----------
+        shots : iterable of (Camera, Params, time in seconds)
+        background : {"sky", None}
+            As for `render`.
+        progress : callable, optional
+            Wraps the shots, such as ``tqdm.tqdm``.
+        """
+        sky = _sky(background)
+        return self._frames(progress(shots) if progress else shots, sky)
+
+    def _frames(self, shots: Iterable[Shot], sky: bool) -> Iterator[Frame]:
+        self._core.cut()
+        for shot in shots:
+            try:
+                camera, params, time = shot
+            except (TypeError, ValueError):
+                raise ParameterError(
+                    f"shot = {shot!r} is not allowed: it must be (camera, params, time)"
+                ) from None
+            self._check(camera, params)
+            yield self._core.animate(camera, params, _time(time), sky)
+
+    def density(
+        self, points: npt.ArrayLike, params: Params, *, time: float = 0.0
+    ) -> npt.NDArray[np.float32]:
+        """Return the extinction at points: the field that `render` marches.
+
+        Parameters
+        ----------
+        points : array-like, shape (N, 3)
+            World metres.
+
+        Returns
+        -------
+        extinction : array of float32, shape (N,)
+            In 1/m.
+        """
+        self._check(None, params)
+        return self._core.density(points, params, _time(time))
+
+    def sun_transmittance(
+        self, points: npt.ArrayLike, params: Params, *, time: float = 0.0
+    ) -> npt.NDArray[np.float32]:
+        """Return how much direct sun reaches points through the clouds.
+
+        Parameters
+        ----------
+        points : array-like, shape (N, 3)
+            World metres.
+
+        Returns
+        -------
+        transmittance : array of float32, shape (N,)
+            0 to 1; 0 where the ground hides the sun.
+        """
+        self._check(None, params)
+        return self._core.sun_transmittance(points, params, _time(time))
+
+    def __repr__(self) -> str:
+        width, height = self._size
+        return f"Renderer({width}, {height}, adapter={self.adapter.name!r})"
+
+    @staticmethod
+    def _check(camera: Camera | None, params: Params) -> None:
+        if camera is not None and not isinstance(camera, Camera):
+            raise ParameterError(f"camera = {camera!r} is not allowed: it must be a nubis.Camera")
+        if not isinstance(params, Params):
+            raise ParameterError(f"params = {params!r} is not allowed: it must be a nubis.Params")
+
+
+_named = quality
+
+
+def _size(name: str, value: Any) -> int:
+    try:
+        size = operator.index(value)
+    except TypeError:
+        size = 0
+    if not 1 <= size <= 65536 or isinstance(value, bool):
+        raise ParameterError(
+            f"{name} = {value!r} is not allowed: it must be a whole number from 1 to 65536 pixels"
+        )
+    return size
+
+
+def _time(value: Any) -> float:
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise ParameterError(
+            f"time = {value!r} is not allowed: it must be a finite number of seconds"
+        ) from None
+
+
+def _sky(background: Any) -> bool:
+    if background is None or (isinstance(background, str) and background == "sky"):
+        return background is not None
+    raise ParameterError(f'background = {background!r} is not allowed: it must be "sky" or None')
+
+
+def _warn_once(adapter: Adapter) -> None:
+    global _warned
+    if adapter.kind == "cpu" and not _warned:
+        _warned = True
+        warnings.warn(
+            f"no hardware Vulkan adapter was found: rendering in software on {adapter.name} "
+            '(adapter="cpu" or NUBIS_ADAPTER=cpu says that this is meant)',
+            stacklevel=3,
+        )

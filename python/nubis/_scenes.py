@@ -1,0 +1,67 @@
+"""Skies to start from: name -> (camera, parameters)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from nubis._nubis import Camera
+from nubis.params import Params
+
+
+def _look(
+    eye: tuple[float, float, float], azimuth: float, pitch: float, fov_y: float = 60.0
+) -> Camera:
+    """A camera that looks along a compass direction, `pitch` degrees above the horizon."""
+    from math import cos, radians, sin
+
+    level = cos(radians(pitch))
+    target = (
+        eye[0] + sin(radians(azimuth)) * level,
+        eye[1] + cos(radians(azimuth)) * level,
+        eye[2] + sin(radians(pitch)),
+    )
+    return Camera.look_at(eye, target, (0, 0, 1), fov_y)
+
+
+def _make() -> dict[str, tuple[Camera, Params]]:
+    fair = Params()
+    return {
+        "fair_weather": (_look((0, 0, 200), 0, 14), fair),
+        "overcast": (
+            _look((0, 0, 200), 20, 16),
+            fair.with_(**{"clouds.coverage": 0.9, "clouds.type": 0.35, "sun.elevation": 35.0}),
+        ),
+        "stratocumulus": (
+            _look((0, 0, 200), 340, 16),
+            fair.with_(**{"clouds.coverage": 0.65, "clouds.type": 0.5, "sun.elevation": 30.0}),
+        ),
+        "storm": (
+            _look((0, 0, 200), 70, 14),
+            fair.with_(
+                **{
+                    "clouds.coverage": 0.75,
+                    "clouds.precipitation": 1.0,
+                    "clouds.top": 6000.0,
+                    "sun.elevation": 25.0,
+                }
+            ),
+        ),
+        "sunset": (
+            _look((0, 0, 200), 250, 11),
+            fair.with_(**{"sun.elevation": 3.0, "sun.azimuth": 258.0, "clouds.coverage": 0.45}),
+        ),
+        "in_cloud": (_look((0, 0, 1900), 20, 4), fair.with_(**{"clouds.coverage": 0.6})),
+        "above": (
+            _look((0, 0, 4500), 20, -10),
+            fair.with_(**{"sun.elevation": 30.0, "sun.azimuth": 320.0, "clouds.coverage": 0.55}),
+        ),
+        "cirrus": (
+            _look((0, 0, 200), 300, 25),
+            fair.with_(**{"clouds.coverage": 0.2, "high_clouds.coverage": 0.6}),
+        ),
+    }
+
+
+#: Skies to start from: name -> (camera, parameters).
+scenes: Mapping[str, tuple[Camera, Params]] = MappingProxyType(_make())

@@ -1,0 +1,371 @@
+"""The parameters of a sky and of the numerical method.
+
+Generated from crates/clouds_core/src/params.rs by `make generate`: change it there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from nubis._block import Block, Root
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Sun(Block):
+    """The sun.
+
+    Attributes
+    ----------
+    elevation : float
+        Height above the horizon. Allowed: a number from -90 to 90 degrees.
+    azimuth : float
+        Compass direction, clockwise from north. Allowed: a number from -360 to 360 degrees.
+    irradiance : tuple[float, float, float]
+        Irradiance on a plane that faces the sun, above the atmosphere (linear Rec. 709). Allowed: 3
+        numbers from 0 to 1000000.
+    visible : bool
+        Whether the sun's disc is drawn. Allowed: True or False.
+    """
+
+    elevation: float = 40.0
+    azimuth: float = 120.0
+    irradiance: tuple[float, float, float] = (5.0, 5.0, 5.0)
+    visible: bool = True
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Clouds(Block):
+    """The volumetric clouds: where they are and what they are made of.
+
+    Attributes
+    ----------
+    coverage : float
+        How much of the sky is cloudy: shifts the weather map's coverage, 0 is clear, 0.5 the map as
+        it is, 1 overcast. Allowed: a number from 0 to 1.
+    type : float
+        Cloud type: 0 stratus, 0.5 stratocumulus, 1 cumulus. Shifts the weather map's type, 0.5 the
+        map as it is. Allowed: a number from 0 to 1.
+    precipitation : float
+        Rain: thickens and darkens the clouds (nubis2015). Scales the weather map's precipitation, 0
+        is dry. Allowed: a number from 0 to 1.
+    base : float
+        Altitude of the cloud base. Allowed: a number from 0 to 20000 m.
+    top : float
+        Altitude of the highest cloud tops. Allowed: a number from 1 to 25000 m.
+    extinction : float
+        Extinction where the density is 1. Allowed: a number from 0 to 100000000 1/m.
+    seed : int
+        Which random shapes. Allowed: a whole number from 0 to 4294967295.
+    noise : {nubis2015, vsu2022}
+        Which noises the shapes are made of. Allowed: one of "nubis2015", "vsu2022".
+    shape_scale : float
+        Width of one tile of the base shape. Allowed: a number from 100 to 200000 m.
+    detail_scale : float
+        Width of one tile of the detail that erodes the edges. Allowed: a number from 10 to 50000 m.
+    detail : float
+        How deep the detail erodes the edges (nubis2015: 0.2). Allowed: a number from 0 to 1.
+    curl_scale : float
+        Width of one tile of the curl noise that swirls the detail. Allowed: a number from 10 to
+        50000 m.
+    curl : float
+        How far curl noise displaces the detail at the base. Allowed: a number from 0 to 2000 m.
+    """
+
+    coverage: float = 0.45
+    type: float = 0.85
+    precipitation: float = 0.0
+    base: float = 1200.0
+    top: float = 3200.0
+    extinction: float = 0.06
+    seed: int = 1
+    noise: Literal["nubis2015", "vsu2022"] = "nubis2015"
+    shape_scale: float = 5200.0
+    detail_scale: float = 640.0
+    detail: float = 0.25
+    curl_scale: float = 2400.0
+    curl: float = 90.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Weather(Block):
+    """The weather map: where the clouds stand.
+
+    Attributes
+    ----------
+    extent : float
+        Width of the square that one map covers; beyond it the map repeats. Allowed: a number from
+        100 to 10000000 m.
+    map : array of float32, shape (H, W, 3), or None
+        A map of your own: coverage, type and precipitation, row 0 in the north; None bakes one from
+        noise. Allowed: None or a float array of shape (H, W, 3), H and W from 1 to 8192, values
+        from 0 to 1.
+    seed : int
+        Which random weather. Allowed: a whole number from 0 to 4294967295.
+    scale : float
+        Typical distance between clouds. Allowed: a number from 100 to 1000000 m.
+    variety : float
+        How much the cover varies over distances of several clouds. Allowed: a number from 0 to 1.
+    """
+
+    extent: float = 60000.0
+    map: npt.NDArray[np.float32] | None = None
+    seed: int = 7
+    scale: float = 5000.0
+    variety: float = 0.5
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Wind(Block):
+    """What moves the clouds.
+
+    Attributes
+    ----------
+    direction : float
+        Compass direction toward which the wind blows, clockwise from north. Allowed: a number from
+        -360 to 360 degrees.
+    speed : float
+        Speed of the base shapes. Allowed: a number from -1000 to 1000 m/s.
+    detail_speed : float
+        Speed of the detail; the difference to `speed` makes the edges boil. Allowed: a number from
+        -1000 to 1000 m/s.
+    shear : float
+        How far the tops lean downwind (nubis2015: 500 m). Allowed: a number from -20000 to 20000 m.
+    updraft : float
+        Speed at which the noises rise. Allowed: a number from -100 to 100 m/s.
+    weather_direction : float
+        Compass direction toward which the weather map drifts. Allowed: a number from -360 to 360
+        degrees.
+    weather_speed : float
+        Speed of the weather map; 0 keeps a composed sky in place while its shapes evolve
+        (thesis2018). Allowed: a number from -1000 to 1000 m/s.
+    """
+
+    direction: float = 60.0
+    speed: float = 8.0
+    detail_speed: float = 11.0
+    shear: float = 400.0
+    updraft: float = 0.8
+    weather_direction: float = 60.0
+    weather_speed: float = 8.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class HighClouds(Block):
+    """The thin high clouds, a layer without thickness on its own sphere (nubis2015; animated as in gems2001).
+
+    Attributes
+    ----------
+    coverage : float
+        How much of the sky they cover. Allowed: a number from 0 to 1.
+    altitude : float
+        Altitude of the layer. Allowed: a number from 100 to 30000 m.
+    optical_depth : float
+        Optical depth, seen from straight below, where they are thickest. Allowed: a number from 0
+        to 100.
+    scale : float
+        Width of one tile of the texture. Allowed: a number from 1000 to 1000000 m.
+    stretch : float
+        How much longer than wide the streaks are: 1 gives altocumulus, more gives cirrus. Allowed:
+        a number from 1 to 16.
+    direction : float
+        Compass direction toward which they drift; the streaks lie along it. Allowed: a number from
+        -360 to 360 degrees.
+    speed : float
+        Speed at which they drift. Allowed: a number from -1000 to 1000 m/s.
+    evolution : float
+        How often the largest shapes are replaced by new ones; each octave after it twice as often.
+        Allowed: a number from 0 to 10 1/s.
+    octaves : int
+        Octaves of noise. Allowed: a whole number from 1 to 8.
+    seed : int
+        Which random shapes. Allowed: a whole number from 0 to 4294967295.
+    texture_size : int
+        Width and height of the texture. Allowed: a whole number from 16 to 4096 texels.
+    """
+
+    coverage: float = 0.35
+    altitude: float = 8500.0
+    optical_depth: float = 0.5
+    scale: float = 42000.0
+    stretch: float = 3.0
+    direction: float = 75.0
+    speed: float = 25.0
+    evolution: float = 0.001
+    octaves: int = 5
+    seed: int = 3
+    texture_size: int = 512
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Light(Block):
+    """How light becomes colour.
+
+    Attributes
+    ----------
+    model : {single, nubis2015, thesis2018, vsu2022}
+        The physics of the light in the clouds. Allowed: one of "single", "nubis2015", "thesis2018",
+        "vsu2022".
+    g : float
+        Mean cosine of the forward lobe of the phase function. Allowed: a number from -0.9999 to
+        0.9999.
+    g_back : float
+        Mean cosine of the backward lobe (thesis2018, vsu2022). Allowed: a number from -0.9999 to
+        0.9999.
+    lobe_mix : float
+        Share of the forward lobe (vsu2022). Allowed: a number from 0 to 1.
+    albedo : float
+        Single-scattering albedo of a droplet (`single`). Allowed: a number from 0 to 1.
+    sun_gain : float
+        Gain of the sunlight in the models that do not conserve energy (all but `single`). Allowed:
+        a number from 0 to 1000.
+    absorption : float
+        How thick the models that do not conserve energy take the cloud to be on the way to the sun
+        (all but `single`). Allowed: a number from 0 to 10.
+    ambient_gain : float
+        Gain of the ambient light (all but `single`). Allowed: a number from 0 to 1000.
+    ambient_top : tuple[float, float, float]
+        Tint of the ambient light at the top of the clouds; its brightness comes from the sky.
+        Allowed: 3 numbers from 0 to 1000.
+    ambient_bottom : tuple[float, float, float]
+        Tint of the ambient light at the base of the clouds; its brightness comes from sky and
+        ground. Allowed: 3 numbers from 0 to 1000.
+    powder : float
+        How strongly thin edges darken ("powdered sugar", nubis2015); 0 switches it off. Allowed: a
+        number from 0 to 1.
+    rain_absorption : float
+        How many times more light is absorbed where precipitation is 1 (nubis2015). Allowed: a
+        number from 1 to 100.
+    cone : float
+        Half width of the cone of light samples, as a share of its length; `single` looks straight
+        at the sun. Allowed: a number from 0 to 1.
+    """
+
+    model: Literal["single", "nubis2015", "thesis2018", "vsu2022"] = "thesis2018"
+    g: float = 0.6
+    g_back: float = -0.25
+    lobe_mix: float = 0.5
+    albedo: float = 0.999
+    sun_gain: float = 6.0
+    absorption: float = 0.12
+    ambient_gain: float = 1.0
+    ambient_top: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    ambient_bottom: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    powder: float = 0.6
+    rain_absorption: float = 2.5
+    cone: float = 0.12
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Atmosphere(Block):
+    """The planet and its air.
+
+    Attributes
+    ----------
+    enabled : bool
+        Whether there is air; without it the sky is black and sunlight arrives undimmed. Allowed:
+        True or False.
+    planet_radius : float
+        Radius of the planet (Earth 6 371 000, thesis2018 400 000). Allowed: a number from 10000 to
+        1000000000 m.
+    haze : float
+        Haze: amount of aerosol, 1 is a clear day. Allowed: a number from 0 to 20.
+    aerial_perspective : float
+        How much air stands between the eye and the clouds: 1 is physical, 0 none. Allowed: a number
+        from 0 to 10.
+    ground_albedo : tuple[float, float, float]
+        Albedo of the ground. Allowed: 3 numbers from 0 to 1.
+    """
+
+    enabled: bool = True
+    planet_radius: float = 6371000.0
+    haze: float = 1.0
+    aerial_perspective: float = 1.0
+    ground_albedo: tuple[float, float, float] = (0.1, 0.12, 0.07)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Quality(Block):
+    """The numerical method: how accurately a sky is computed, never how it looks.
+
+    Attributes
+    ----------
+    steps_zenith : int
+        View steps straight up. Allowed: a whole number from 1 to 4096.
+    steps_horizon : int
+        View steps toward the horizon. Allowed: a whole number from 1 to 4096.
+    step_growth : float
+        How much steps grow with distance: 0 makes all of a ray's steps equal, 1 lets a step be a
+        fixed share of its distance. Allowed: a number from 0 to 1.
+    big_step : int
+        How many steps one step outside cloud is long; on a hit the march goes back. Allowed: a
+        whole number from 1 to 16.
+    empty_samples : int
+        Full samples of zero in a row after which samples are cheap again (nubis2015: 6). Allowed: a
+        whole number from 1 to 4096.
+    light_steps : int
+        Light samples toward the sun, besides the far one. Allowed: a whole number from 1 to 128.
+    light_distance : float
+        How far the light samples reach; the far sample stands for as much as four times that,
+        beyond. Allowed: a number from 1 to 100000 m.
+    far_sample : bool
+        Whether there is a far light sample, for shadows from distant clouds. Allowed: True or
+        False.
+    cheap_light : float
+        Opacity in front of a sample past which its light samples leave out the detail (nubis2015:
+        0.3). Allowed: a number from 0 to 1.
+    min_transmittance : float
+        Transmittance at which a ray ends; what is left is scaled away, not lost. Allowed: a number
+        from 0 to 0.5.
+    jitter : bool
+        Whether each ray starts at a blue-noise offset of up to one step. Allowed: True or False.
+    view_distance : float
+        Farthest distance at which clouds are marched. Allowed: a number from 1000 to 1000000000 m.
+    """
+
+    steps_zenith: int = 80
+    steps_horizon: int = 192
+    step_growth: float = 1.0
+    big_step: int = 2
+    empty_samples: int = 6
+    light_steps: int = 6
+    light_distance: float = 700.0
+    far_sample: bool = True
+    cheap_light: float = 0.3
+    min_transmittance: float = 0.01
+    jitter: bool = True
+    view_distance: float = 400000.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Params(Root):
+    """Everything that a sky looks like; the defaults are a fair-weather sky.
+
+    Attributes
+    ----------
+    sun : Sun
+        The sun.
+    clouds : Clouds
+        The volumetric clouds: where they are and what they are made of.
+    weather : Weather
+        The weather map: where the clouds stand.
+    wind : Wind
+        What moves the clouds.
+    high_clouds : HighClouds
+        The thin high clouds, a layer without thickness on its own sphere (nubis2015; animated as in gems2001).
+    light : Light
+        How light becomes colour.
+    atmosphere : Atmosphere
+        The planet and its air.
+    """
+
+    sun: Sun = field(default_factory=Sun)
+    clouds: Clouds = field(default_factory=Clouds)
+    weather: Weather = field(default_factory=Weather)
+    wind: Wind = field(default_factory=Wind)
+    high_clouds: HighClouds = field(default_factory=HighClouds)
+    light: Light = field(default_factory=Light)
+    atmosphere: Atmosphere = field(default_factory=Atmosphere)

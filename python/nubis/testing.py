@@ -1,0 +1,43 @@
+"""Looking inside: the value of single shader functions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from nubis._renderer import Renderer
+from nubis.params import Params, Quality
+
+
+def probe(
+    expression: str,
+    inputs: npt.ArrayLike,
+    *,
+    imports: Sequence[str] = (),
+    params: Params | None = None,
+    time: float = 0.0,
+    quality: str | Quality = "balanced",
+) -> npt.NDArray[np.float32]:
+    """Return the value of a WGSL expression of ``x: vec4f`` for each input.
+
+    Parameters
+    ----------
+    expression : str
+        A scalar or a vec4f, such as ``"henyey_greenstein(x.x, x.y)"``.
+    inputs : array-like, shape (N,) or (N, k), k up to 4
+        Missing components of ``x`` are 0.
+    imports : sequence of str
+        Files of ``shaders/wgsl`` without the ending, such as ``"phase"``.
+
+    Returns
+    -------
+    values : array of float32, shape (N, 4)
+    """
+    given = np.asarray(inputs, dtype=np.float32)
+    given = given.reshape(len(given), -1)
+    full = np.zeros((len(given), 4), dtype=np.float32)
+    full[:, : given.shape[1]] = given
+    renderer = Renderer(1, 1, quality=quality)
+    return renderer._core.probe(list(imports), expression, full.tolist(), params or Params(), time)

@@ -1,0 +1,162 @@
+// The air: Rayleigh, aerosol and ozone with exponential profiles, their optical depths in closed form, and one order of
+// scattering plus an isotropic guess at the rest. A stand-in until the look-up tables of Hillaire 2020; it looks right
+// from noon to the end of dusk, and is not a measured sky.
+#import math
+#import phase
+#import shell
+
+// Coefficients at sea level, 1/m, for Rec. 709 red, green, blue, and scale heights (Hillaire 2020, table 1).
+const RAYLEIGH = vec3f(5.802e-6, 13.558e-6, 33.1e-6);
+const RAYLEIGH_HEIGHT = 8000.0;
+const MIE_SCATTERING = 3.996e-6;
+const MIE_EXTINCTION = 4.440e-6;
+const MIE_HEIGHT = 1200.0;
+const MIE_G = 0.8;
+// The whole ozone layer straight up: absorption 0.650, 1.881, 0.085e-6 1/m at its middle, a triangle 30 km wide.
+const OZONE = vec3f(0.00975, 0.0282, 0.0013);
+const OZONE_ALTITUDE = 25000.0;
+
+// Optical depth of an exponential layer of scale height H from altitude h to space, as a length at sea level: Chapman's
+// function for x = (R + h) / H, as Schueler approximates it ("An approximation to the Chapman grazing-incidence
+// function", GPU Pro 3, 2012; 1 % or better for Earth).
+fn chapman(h: f32, mu: f32, scale_height: f32) -> f32 {
+    let x = (params.atmosphere.planet_radius + h) / scale_height;
+    let c = sqrt(0.5 * PI * x);
+    let up = c / ((c - 1.0) * abs(mu) + 1.0);
+    if mu >= 0.0 {
+        return scale_height * exp(-max(h, 0.0) / scale_height) * up;
+    }
+    // Through the lowest point of the ray and out again: twice the way up from there, less the part behind.
+    let x0 = sqrt(max(1.0 - mu * mu, 0.0)) * x;
+    let lowest = h - (x - x0) * scale_height;
+    // Through the ground: so deep that nothing arrives, but finite.
+    let below = min(exp(-lowest / scale_height), 1e6);
+    return scale_height * max(2.0 * sqrt(0.5 * PI * x0) * below - up * exp(-max(h, 0.0) / scale_height), 0.0);
+}
+
+// Transmittance of the air from altitude h to space along a direction with zenith cosine mu.
+fn air_transmittance(h: f32, mu: f32) -> vec3f {
+    if params.atmosphere.enabled == 0u {
+        return vec3f(1.0);
+    }
+    let radius = params.atmosphere.planet_radius;
+    let ratio = (radius + h) / (radius + OZONE_ALTITUDE);
+    let ozone = OZONE / sqrt(max(1.0 - ratio * ratio * (1.0 - mu * mu), 1e-3));
+    let depth = RAYLEIGH * chapman(h, mu, RAYLEIGH_HEIGHT)
+        + params.atmosphere.haze * MIE_EXTINCTION * chapman(h, mu, MIE_HEIGHT)
+        + select(ozone, vec3f(0.0), h > OZONE_ALTITUDE);
+    return exp(-depth);
+}
+
+// How much of the sun stands above the horizon of a point: 0 below it, 1 above, over the sun's half degree.
+fn sun_above_ground(h: f32, mu: f32) -> f32 {
+    let ratio = params.atmosphere.planet_radius / (params.atmosphere.planet_radius + max(h, 0.0));
+    let horizon = -sqrt(max(1.0 - ratio * ratio, 0.0));
+    return smoothstep(-0.005, 0.005, mu - horizon);
+}
+
+// Irradiance of the sun at a point, on a plane that faces it.
+fn sun_irradiance(h: f32, mu: f32) -> vec3f {
+    let shadow = sun_above_ground(h, mu);
+    return params.sun.irradiance * air_transmittance(h, mu) * shadow;
+}
+
+// Length of a path through an exponential layer between two altitudes, as a length at sea level.
+fn path_length(h0: f32, h1: f32, distance: f32, scale_height: f32) -> f32 {
+    let low = max(min(h0, h1), 0.0);
+    return distance * exp(-low / scale_height) * one_minus_exp_over(abs(h1 - h0) / scale_height);
+}
+
+// Transmittance of the air between the camera and a point at altitude `h` and distance `t`.
+fn aerial_transmittance(h: f32, t: f32) -> vec3f {
+    if params.atmosphere.enabled == 0u {
+        return vec3f(1.0);
+    }
+    let depth = RAYLEIGH * path_length(frame.altitude, h, t, RAYLEIGH_HEIGHT)
+        + params.atmosphere.haze * MIE_EXTINCTION * path_length(frame.altitude, h, t, MIE_HEIGHT);
+    return exp(-params.atmosphere.aerial_perspective * depth);
+}
+
+// Radiance of the air along a direction from the camera, up to the ground or to space.
+fn air_radiance(direction: vec3f) -> vec3f {
+    if params.atmosphere.enabled == 0u {
+        return vec3f(0.0);
+    }
+    let air = hit_sphere(direction, frame.power_air);
+    if !air.hit {
+        return vec3f(0.0);
+    }
+    let ground = hit_sphere(direction, frame.power_ground);
+    let end = select(air.far, ground.near, ground.hit && ground.near > 0.0);
+    let length = max(end - air.near, 0.0);
+    let one_minus_mu = one_minus_cos(direction, frame.sun_direction);
+    let mu = 1.0 - one_minus_mu;
+    let rayleigh_phase = 3.0 / (16.0 * PI) * (1.0 + mu * mu);
+    let mie_phase = henyey_greenstein(one_minus_mu, MIE_G);
+
+    const STEPS = 48;
+    var radiance = vec3f(0.0);
+    var transmittance = vec3f(1.0);
+    for (var i = 0; i < STEPS; i++) {
+        // Squares put the samples where the air is dense: near the camera.
+        let a = f32(i) / f32(STEPS);
+        let b = f32(i + 1) / f32(STEPS);
+        let step = (b * b - a * a) * length;
+        let p = (air.near + 0.5 * (a * a + b * b) * length) * direction;
+        let h = altitude_at(p);
+        let mu_sun = cos_zenith_at(p, frame.sun_direction);
+        let rayleigh = RAYLEIGH * exp(-max(h, 0.0) / RAYLEIGH_HEIGHT);
+        let mie = params.atmosphere.haze * exp(-max(h, 0.0) / MIE_HEIGHT);
+        let sun = air_transmittance(h, mu_sun) * sun_above_ground(h, mu_sun);
+        // All further orders as one isotropic field. Its strength (0.05 of the sun's irradiance at noon, a tenth of that
+        // at sunset) was set by eye against the look-ups of Hillaire 2020's figures.
+        let high_sun = smoothstep(-0.25, 0.5, mu_sun);
+        let rest = (0.008 + 0.05 * high_sun) * smoothstep(-0.22, 0.02, mu_sun)
+            * exp(-0.45 * RAYLEIGH * chapman(h, max(mu_sun, 0.03), RAYLEIGH_HEIGHT));
+        let source = (rayleigh * (rayleigh_phase * sun + rest) + mie * MIE_SCATTERING * (mie_phase * sun + rest))
+            * params.sun.irradiance;
+        let extinction = rayleigh + mie * MIE_EXTINCTION;
+        let x = extinction * step;
+        let share = vec3f(one_minus_exp_over(x.r), one_minus_exp_over(x.g), one_minus_exp_over(x.b));
+        radiance += transmittance * source * step * share;
+        transmittance *= exp(-x);
+    }
+    return radiance;
+}
+
+// Radiance of the ground under the sun and a sky that adds a fifth to it.
+fn ground_radiance(mu_sun: f32) -> vec3f {
+    let sun = sun_irradiance(0.0, mu_sun) * max(mu_sun, 0.0);
+    let skylight = 0.12 * params.sun.irradiance * smoothstep(-0.15, 0.6, mu_sun) * vec3f(0.7, 0.9, 1.2);
+    return params.atmosphere.ground_albedo / PI * (sun + skylight);
+}
+
+// Coordinates of a direction in the sky map: azimuth from the sun across, angle from the horizon down, with square
+// roots so that the horizon, where the sky changes fastest, has most of the rows; its edge is the middle of the map.
+fn sky_coordinates(direction: vec3f) -> vec2f {
+    let sine = clamp(dot(direction, frame.zenith), -1.0, 1.0);
+    let elevation = asin(sine) + frame.horizon_dip;
+    let flat_sun = frame.sun_direction - dot(frame.sun_direction, frame.zenith) * frame.zenith;
+    let flat_view = direction - sine * frame.zenith;
+    let cosine = dot(flat_sun, flat_view) / max(length(flat_sun) * length(flat_view), 1e-6);
+    let u = acos(clamp(cosine, -1.0, 1.0)) / PI;
+    let above = saturate(elevation / (0.5 * PI + frame.horizon_dip));
+    let below = saturate(-elevation / (0.5 * PI - frame.horizon_dip));
+    let v = select(0.5 + 0.5 * sqrt(below), 0.5 - 0.5 * sqrt(above), elevation >= 0.0);
+    return vec2f(u, v);
+}
+
+// Radiance of the air in a direction, without clouds, sun and ground.
+fn sky_radiance(direction: vec3f) -> vec3f {
+    let size = vec2f(textureDimensions(sky_map));
+    let at = sky_coordinates(direction);
+    // Keep the two halves apart: half a texel from the horizon on either side.
+    let half_texel = 0.5 / size;
+    let v = select(
+        clamp(at.y, 0.5 + half_texel.y, 1.0 - half_texel.y),
+        clamp(at.y, half_texel.y, 0.5 - half_texel.y),
+        at.y < 0.5,
+    );
+    let u = mix(half_texel.x, 1.0 - half_texel.x, at.x);
+    return textureSampleLevel(sky_map, clamp_sampler, vec2f(u, v), 0.0).rgb;
+}

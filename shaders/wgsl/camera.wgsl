@@ -1,0 +1,79 @@
+// Which way a pixel looks, and which pixel a direction falls on, for every kind of camera.
+#import math
+#import bindings
+
+const PERSPECTIVE = 0u;
+const EQUIRECT = 1u; // centre north, right clockwise from above
+const FISHEYE = 2u; // equidistant: the angle to the axis grows linearly from the centre
+
+// A unit direction, or nothing (w = 0) outside the circle of a fisheye. `pixel` has its centres at half-integers.
+fn view_direction(pixel: vec2f) -> vec4f {
+    let size = vec2f(f32(frame.width), f32(frame.height));
+    let ndc = vec2f(2.0, -2.0) * (pixel / size) + vec2f(-1.0, 1.0); // right and up
+    var local: vec3f; // right, up, forward
+    var valid = 1.0;
+    switch frame.camera_kind {
+        case EQUIRECT: {
+            let longitude = ndc.x * PI;
+            let latitude = ndc.y * 0.5 * PI;
+            local = vec3f(sin(longitude) * cos(latitude), sin(latitude), cos(longitude) * cos(latitude));
+        }
+        case FISHEYE: {
+            let p = ndc * size / min(size.x, size.y);
+            let r = length(p);
+            let angle = r * frame.half_fov;
+            local = vec3f(p / max(r, 1e-9) * sin(angle), cos(angle));
+            valid = select(0.0, 1.0, r <= 1.0);
+        }
+        default: {
+            local = vec3f(ndc * vec2f(size.x / size.y, 1.0) * frame.tan_half_fov, 1.0);
+        }
+    }
+    let direction = local.x * frame.right + local.y * frame.up + local.z * frame.forward;
+    return vec4f(normalize(direction), valid);
+}
+
+// The pixel that a direction from the previous camera falls on; z is 0 where it falls on none.
+fn previous_pixel(direction: vec3f) -> vec3f {
+    let size = vec2f(f32(frame.width), f32(frame.height));
+    let local = vec3f(
+        dot(direction, frame.previous_right),
+        dot(direction, frame.previous_up),
+        dot(direction, frame.previous_forward),
+    );
+    var ndc: vec2f;
+    var valid = true;
+    switch frame.camera_kind {
+        case EQUIRECT: {
+            ndc = vec2f(atan2(local.x, local.z) / PI, asin(clamp(local.y, -1.0, 1.0)) / (0.5 * PI));
+        }
+        case FISHEYE: {
+            let sine = length(local.xy);
+            let r = atan2(sine, local.z) / frame.previous_half_fov;
+            ndc = local.xy / max(sine, 1e-9) * r * min(size.x, size.y) / size;
+            valid = r <= 1.0;
+        }
+        default: {
+            valid = local.z > 1e-6;
+            ndc = local.xy / max(local.z, 1e-6) / frame.previous_tan_half_fov * vec2f(size.y / size.x, 1.0);
+        }
+    }
+    let pixel = (ndc * vec2f(0.5, -0.5) + 0.5) * size;
+    valid = valid && all(pixel >= vec2f(0.0)) && all(pixel <= size);
+    return vec3f(pixel, select(0.0, 1.0, valid));
+}
+
+// Width of a pixel at distance 1, in the middle of the picture.
+fn pixel_width() -> f32 {
+    switch frame.camera_kind {
+        case EQUIRECT: {
+            return 2.0 * PI / f32(frame.width);
+        }
+        case FISHEYE: {
+            return 2.0 * frame.half_fov / f32(min(frame.width, frame.height));
+        }
+        default: {
+            return 2.0 * frame.tan_half_fov / f32(frame.height);
+        }
+    }
+}

@@ -1,0 +1,161 @@
+// Marches each pixel's ray through the cloud shell: radiance, transmittance, depth, samples (nubis2015, "march").
+#import bindings
+#import camera
+#import shell
+#import density
+#import light
+
+@compute @workgroup_size(8, 8)
+fn march(@builtin(global_invocation_id) id: vec3u) {
+    if id.x >= frame.march_width || id.y >= frame.rows {
+        return;
+    }
+    let cell = vec2u(id.x, frame.first_row + id.y);
+    // The last cells of a subset may hang over the edge; they march the edge.
+    let pixel = min(cell * frame.stride + vec2u(frame.subpixel_x, frame.subpixel_y), vec2u(frame.width, frame.height) - 1u);
+    let view = view_direction(vec2f(pixel) + 0.5);
+    var cloud = Cloud(vec3f(0.0), 1.0, -1.0);
+    if view.w > 0.0 {
+        cloud = march_ray(view.xyz, ray_offset(pixel));
+    }
+    let index = (frame.buffer_row + id.y) * frame.march_width + id.x;
+    clouds[index] = vec4f(cloud.radiance, cloud.transmittance);
+    cloud_depth[index] = cloud.depth;
+    samples[index] = evaluations;
+}
+
+struct Cloud {
+    radiance: vec3f, // premultiplied
+    transmittance: f32,
+    depth: f32, // m, -1 where there is none
+}
+
+// One blue-noise offset of up to a step for the whole ray: it turns bands into fine noise at no cost in error, where
+// an offset for each step would cost twenty times the error (docs/numerics.md).
+fn ray_offset(pixel: vec2u) -> f32 {
+    let rank = textureLoad(blue_noise, pixel % 64u, 0).r;
+    return select(0.5, fract(rank + frame.jitter_shift), quality.jitter > 0u);
+}
+
+// The steps of a ray: `count` of them over `length` metres, growing with distance by `growth` per metre.
+struct Steps {
+    count: u32,
+    length: f32,
+    growth: f32,
+    scale: f32, // log2 of the ratio of a step to the one before
+}
+
+fn ray_steps(start: f32, length: f32, direction: vec3f) -> Steps {
+    let slant = 1.0 - abs(dot(direction, frame.zenith));
+    let count = mix(f32(quality.steps_zenith), f32(quality.steps_horizon), slant);
+    // At full growth a step is a fixed share of its distance plus 1 km: rays that start in the cloud have fine steps
+    // near the eye, rays that start far away have nearly equal ones.
+    var growth = quality.step_growth / (start + 1000.0);
+    growth = select(growth, 0.0, growth * length < 1e-3);
+    return Steps(u32(round(count)), length, growth, log2(1.0 + growth * length) / round(count));
+}
+
+// Distance from the start of the march to a step boundary.
+fn step_distance(steps: Steps, i: f32) -> f32 {
+    if steps.growth == 0.0 {
+        return steps.length * i / f32(steps.count);
+    }
+    return (exp2(steps.scale * i) - 1.0) / steps.growth;
+}
+
+fn march_ray(direction: vec3f, offset: f32) -> Cloud {
+    let stretches = cloud_stretches(direction);
+    let room = max(quality.view_distance - stretches.start, 0.0);
+    let length = min(stretches.first + stretches.second, room);
+    var transmittance = 1.0;
+    if length <= 0.0 || params.clouds.coverage <= 0.0 {
+        return Cloud(vec3f(0.0), 1.0, -1.0);
+    }
+    let steps = ray_steps(stretches.start, length, direction);
+    let pixel_size = pixel_width();
+    let sunlit = any(sky_light[2].rgb > vec3f(0.0));
+
+    // Scalars alone are summed along the ray; colours come once, at its end.
+    var sun = 0.0;
+    var ambient_top = 0.0;
+    var ambient_bottom = 0.0;
+    var weight_sum = 0.0;
+    var distance_sum = 0.0;
+
+    let big = quality.big_step;
+    var searching = true; // cheap samples, big steps
+    var empty = 0u;
+    var seen = 0u; // steps below this one have had their full sample
+    var i = 0u;
+    // Going back repeats at most `big` steps for every full stretch, so three times the steps is never reached.
+    let limit = 3u * steps.count + 2u * big;
+    for (var iteration = 0u; iteration < limit; iteration++) {
+        if i >= steps.count {
+            break;
+        }
+        let from_start = step_distance(steps, f32(i) + offset);
+        let step = step_distance(steps, f32(i + 1u)) - step_distance(steps, f32(i));
+        let t = stretches.start + from_start + select(0.0, stretches.gap, from_start > stretches.first);
+        let p = t * direction;
+        let altitude = altitude_at(p);
+        // What one sample stands for: a pixel across, and a good part of a step along the ray.
+        let width = max(t * pixel_size, 0.3 * step);
+        let shape = cloud_shape(p, altitude, width);
+
+        if searching {
+            if shape.density <= 0.0 {
+                i += big;
+                continue;
+            }
+            searching = false;
+            empty = 0u;
+            let back = max(i - min(i, big - 1u), seen);
+            if back < i {
+                i = back;
+                continue;
+            }
+        }
+        i += 1u;
+        seen = i;
+
+        let density = cloud_density(p, altitude, shape, width);
+        if density <= 0.0 {
+            empty += 1u;
+            searching = empty >= quality.empty_samples;
+            continue;
+        }
+        empty = 0u;
+
+        let x = density * params.clouds.extinction * step;
+        let weight = transmittance * x * one_minus_exp_over(x);
+        var depth_to_sun = 0.0;
+        if sunlit {
+            depth_to_sun = optical_depth_to_sun(p, 1.0 - transmittance, width);
+        }
+        let above = ambient_share(shape.height);
+        sun += weight * sun_energy(depth_to_sun, shape.precipitation);
+        ambient_top += weight * above;
+        ambient_bottom += weight * (1.0 - above);
+        weight_sum += weight;
+        distance_sum += weight * t;
+        transmittance *= exp(-x);
+        if transmittance < quality.min_transmittance {
+            break;
+        }
+    }
+    if weight_sum <= 0.0 {
+        return Cloud(vec3f(0.0), 1.0, -1.0);
+    }
+
+    var scale = 1.0;
+    if transmittance < quality.min_transmittance {
+        // What the rest of the ray would have added is taken to be like what was seen.
+        scale = 1.0 / (1.0 - transmittance);
+        transmittance = 0.0;
+    }
+    let phase = model_phase(one_minus_cos(direction, frame.sun_direction));
+    let radiance = phase * sun * sky_light[2].rgb
+        + has_ambient() * (ambient_top * params.light.ambient_top * sky_light[0].rgb
+        + ambient_bottom * params.light.ambient_bottom * sky_light[1].rgb);
+    return Cloud(scale * radiance, transmittance, distance_sum / weight_sum);
+}

@@ -1,0 +1,99 @@
+// Bakes the three noise textures (nubis2015, "noise"): base shape, detail, curl. All tile.
+#import bindings
+#import gradient_noise
+
+// Different lattices for different octaves and textures.
+const PERLIN_SALT = 1u;
+const WORLEY_SALT = 31u;
+const DETAIL_SALT = 61u;
+const CURL_SALT = 91u;
+
+fn tile_point(id: vec3u, size: vec3u) -> vec3f {
+    return (vec3f(id) + 0.5) / vec3f(size);
+}
+
+// 128^3: R Perlin-Worley; G, B, A Worley FBMs of rising frequency. The five Worley octaves are computed once and shared.
+// vsu2022: Perlin-Worley of rising frequency in all four.
+@compute @workgroup_size(4, 4, 4)
+fn shape(@builtin(global_invocation_id) id: vec3u) {
+    let size = textureDimensions(volume_out);
+    if any(id >= size) {
+        return;
+    }
+    let p = tile_point(id, size);
+    let seed = params.clouds.seed * 131u;
+    var w: array<f32, 5>; // 3, 6, 12, 24, 48 cells a tile
+    for (var i = 0u; i < 5u; i++) {
+        w[i] = worley(p, 3u << i, seed + WORLEY_SALT + i);
+    }
+    let r = fbm3(vec3f(w[0], w[1], w[2]));
+    let g = fbm3(vec3f(w[1], w[2], w[3]));
+    let b = fbm3(vec3f(w[2], w[3], w[4]));
+    let a = 0.75 * w[3] + 0.25 * w[4];
+    var texel = vec4f(perlin_worley(perlin_fbm(p, 3u, 5u, seed + PERLIN_SALT), r), g, b, a);
+    if params.clouds.noise == NOISE_VSU2022 {
+        texel.g = perlin_worley(perlin_fbm(p, 6u, 4u, seed + PERLIN_SALT + 5u), g);
+        texel.b = perlin_worley(perlin_fbm(p, 12u, 3u, seed + PERLIN_SALT + 9u), b);
+        texel.a = perlin_worley(perlin_fbm(p, 24u, 2u, seed + PERLIN_SALT + 12u), a);
+    }
+    textureStore(volume_out, id, texel);
+}
+
+// 32^3: Worley FBMs of rising frequency in R, G, B; Perlin-Worley in all of them for vsu2022.
+@compute @workgroup_size(4, 4, 4)
+fn detail(@builtin(global_invocation_id) id: vec3u) {
+    let size = textureDimensions(volume_out);
+    if any(id >= size) {
+        return;
+    }
+    let p = tile_point(id, size);
+    let seed = params.clouds.seed * 131u + DETAIL_SALT;
+    var w: array<f32, 4>; // 2, 4, 8, 16 cells a tile
+    for (var i = 0u; i < 4u; i++) {
+        w[i] = worley(p, 2u << i, seed + i);
+    }
+    var texel = vec3f(
+        fbm3(vec3f(w[0], w[1], w[2])),
+        fbm3(vec3f(w[1], w[2], w[3])),
+        0.75 * w[2] + 0.25 * w[3],
+    );
+    if params.clouds.noise == NOISE_VSU2022 {
+        for (var i = 0u; i < 3u; i++) {
+            texel[i] = perlin_worley(perlin_fbm(p, 2u << i, 3u, seed + 4u + i), texel[i]);
+        }
+    }
+    textureStore(volume_out, id, vec4f(texel, 1.0));
+}
+
+fn curl_potential(p: vec2f, seed: u32) -> f32 {
+    return perlin_fbm(vec3f(p, 0.5), 4u, 3u, seed);
+}
+
+// 128^2: the curl of a potential, which has no divergence: it swirls and never gathers (Bridson 2007). About -1 to 1.
+@compute @workgroup_size(8, 8)
+fn curl(@builtin(global_invocation_id) id: vec3u) {
+    let size = textureDimensions(map_out);
+    if any(id.xy >= size) {
+        return;
+    }
+    let p = (vec2f(id.xy) + 0.5) / vec2f(size);
+    let seed = params.clouds.seed * 131u + CURL_SALT;
+    let e = 0.5 / f32(size.x);
+    let dx = curl_potential(p + vec2f(e, 0.0), seed) - curl_potential(p - vec2f(e, 0.0), seed);
+    let dy = curl_potential(p + vec2f(0.0, e), seed) - curl_potential(p - vec2f(0.0, e), seed);
+    // A slope of 5 a tile is about the largest that three octaves from 4 cells up reach.
+    textureStore(map_out, id.xy, vec4f(vec2f(dy, -dx) / (2.0 * e) / 5.0, 0.0, 1.0));
+}
+
+// Half the size, each texel the mean of eight: wgpu makes no mips of volumes.
+@compute @workgroup_size(4, 4, 4)
+fn downsample(@builtin(global_invocation_id) id: vec3u) {
+    if any(id >= textureDimensions(volume_out)) {
+        return;
+    }
+    var sum = vec4f(0.0);
+    for (var i = 0u; i < 8u; i++) {
+        sum += textureLoad(volume_in, id * 2u + vec3u(i & 1u, (i >> 1u) & 1u, i >> 2u), 0);
+    }
+    textureStore(volume_out, id, sum / 8.0);
+}

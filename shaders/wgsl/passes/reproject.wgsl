@@ -1,0 +1,117 @@
+// Fills the picture from the subset of pixels that was marched, and from the frame before (nubis2015, "reprojection").
+#import bindings
+#import camera
+#import shell
+
+// A pixel's history counts for this many marched samples at most: after that old samples fade.
+const MAX_COUNT_STILL = 64u;
+const MAX_COUNT_MOVING = 3u;
+
+@compute @workgroup_size(8, 8)
+fn reproject(@builtin(global_invocation_id) id: vec3u) {
+    if id.x >= frame.width || id.y >= frame.rows {
+        return;
+    }
+    let pixel = vec2u(id.x, frame.first_row + id.y);
+    let index = pixel.y * frame.width + pixel.x;
+    let subpixel = vec2u(frame.subpixel_x, frame.subpixel_y);
+    let cell = vec2i(pixel / frame.stride);
+    let is_fresh = all(pixel % frame.stride == subpixel);
+
+    // The marched pixels around this one: their spread, a smooth guess, and the nearest cloud.
+    var mean = vec4f(0.0);
+    var square = vec4f(0.0);
+    var guess = vec4f(0.0);
+    var guess_weight = 0.0;
+    var distance = -1.0;
+    var nearest = 1e9;
+    for (var i = 0; i < 9; i++) {
+        let neighbour = cell + vec2i(i % 3, i / 3) - 1;
+        let at = fresh_index(neighbour);
+        let value = fresh[at];
+        mean += value / 9.0;
+        square += value * value / 9.0;
+        let offset = (vec2f(neighbour * i32(frame.stride)) + vec2f(subpixel) - vec2f(pixel)) / f32(frame.stride);
+        let weight = max(1.0 - abs(offset.x), 0.0) * max(1.0 - abs(offset.y), 0.0);
+        guess += weight * value;
+        guess_weight += weight;
+        let away = dot(offset, offset);
+        if fresh_depth[at] >= 0.0 && away < nearest {
+            nearest = away;
+            distance = fresh_depth[at];
+        }
+    }
+    guess = guess / max(guess_weight, 1e-6);
+    let own = fresh[fresh_index(cell)];
+    let own_depth = fresh_depth[fresh_index(cell)];
+
+    // Without history: what was marched here, or the smooth guess.
+    var value = select(guess, own, is_fresh);
+    var value_depth = select(distance, own_depth, is_fresh);
+    var value_count = select(0u, 1u, is_fresh);
+
+    // Where the cloud seen here was in the frame before. Where no cloud is near, the sky stands still.
+    let view = view_direction(vec2f(pixel) + 0.5);
+    let away = select(frame.far_distance, distance, distance >= 0.0);
+    let before = away * view.xyz + frame.eye_motion - frame.cloud_motion;
+    let was = previous_pixel(normalize(before));
+    if was.z > 0.0 {
+        let old = history_at(was.xy);
+        let old_index = nearest_index(was.xy);
+        let old_count = history_count[old_index];
+        if old_count > 0u && is_finite4(old) {
+            var kept = old;
+            if frame.moving > 0u {
+                let deviation = sqrt(max(square - mean * mean, vec4f(0.0)));
+                kept = clamp(old, mean - 1.25 * deviation, mean + 1.25 * deviation);
+            }
+            let limit = select(MAX_COUNT_STILL, MAX_COUNT_MOVING, frame.moving > 0u);
+            value_count = min(old_count, limit);
+            if is_fresh {
+                value_count += 1u;
+                value = mix(kept, own, 1.0 / f32(value_count));
+            } else {
+                value = kept;
+                let old_depth = history_depth[old_index];
+                value_depth = select(distance, old_depth, frame.moving == 0u);
+            }
+        }
+    }
+    if !is_finite4(value) {
+        value = vec4f(0.0, 0.0, 0.0, 1.0);
+    }
+    clouds[index] = vec4f(max(value.rgb, vec3f(0.0)), saturate(value.a));
+    cloud_depth[index] = select(max(value_depth, 0.0), -1.0, value.a >= 1.0);
+    count[index] = value_count;
+}
+
+fn fresh_index(cell: vec2i) -> u32 {
+    let size = vec2i(i32(frame.march_width), i32((frame.height + frame.stride - 1u) / frame.stride));
+    let inside = vec2u(clamp(cell, vec2i(0), size - 1));
+    return inside.y * frame.march_width + inside.x;
+}
+
+fn pixel_index(pixel: vec2i) -> u32 {
+    let inside = vec2u(clamp(pixel, vec2i(0), vec2i(i32(frame.width), i32(frame.height)) - 1));
+    return inside.y * frame.width + inside.x;
+}
+
+fn nearest_index(at: vec2f) -> u32 {
+    return pixel_index(vec2i(floor(at)));
+}
+
+// The history between four pixel centres. A pixel that has not moved reads itself, exactly.
+fn history_at(at: vec2f) -> vec4f {
+    let p = at - 0.5;
+    let snapped = select(p, round(p), abs(p - round(p)) < vec2f(1e-3));
+    let corner = vec2i(floor(snapped));
+    let f = snapped - floor(snapped);
+    let top = mix(history[pixel_index(corner)], history[pixel_index(corner + vec2i(1, 0))], f.x);
+    let bottom = mix(history[pixel_index(corner + vec2i(0, 1))], history[pixel_index(corner + vec2i(1, 1))], f.x);
+    return mix(top, bottom, f.y);
+}
+
+// NaN would live in the history for ever, and lavapipe optimises x != x away: test the bits (hazard 11).
+fn is_finite4(v: vec4f) -> bool {
+    return all((bitcast<vec4u>(v) & vec4u(0x7fffffffu)) < vec4u(0x7f800000u));
+}

@@ -1,0 +1,25 @@
+// Random numbers on lattices: integers in, so that nothing repeats or thins out at large coordinates (hazard 14).
+
+// Three 32-bit hashes of three (pcg3d: Jarzynski and Olano, "Hash Functions for GPU Rendering", JCGT 2020).
+fn pcg3d(input: vec3u) -> vec3u {
+    var v = input * 1664525u + 1013904223u;
+    v.x += v.y * v.z;
+    v.y += v.z * v.x;
+    v.z += v.x * v.y;
+    v ^= v >> vec3u(16u);
+    v.x += v.y * v.z;
+    v.y += v.z * v.x;
+    v.z += v.x * v.y;
+    return v;
+}
+
+// Three numbers in [0, 1) for a cell of a lattice; `salt` tells lattices and seeds apart.
+fn random3(cell: vec3u, salt: u32) -> vec3f {
+    let hash = pcg3d(cell + vec3u(salt * 747796405u, salt * 2891336453u, salt * 277803737u));
+    return vec3f(hash >> vec3u(8u)) / 16777216.0;
+}
+
+// The cell of a lattice that repeats after `period` cells.
+fn wrap_cell(cell: vec3i, period: i32) -> vec3u {
+    return vec3u((cell % period + period) % period);
+}

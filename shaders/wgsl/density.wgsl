@@ -16,12 +16,14 @@ struct LocalWeather {
     precipitation: f32,
 }
 
-// The base shape at a point, before detail: cheap, and never smaller than the density.
-struct Shape {
-    density: f32,
+// What the weather alone says of a point: enough to know that there is no cloud.
+struct Column {
+    limit: f32, // the base shape cannot exceed it; 0 where there is no cloud
+    profile: f32,
+    coverage: f32,
     height: f32, // 0 at the base of the shell, 1 at its top
     precipitation: f32,
-    lean: vec2f, // where the wind has carried this height, m
+    at: vec2f, // where the point would be without the wind's lean, m
 }
 
 // How the three parameters of a cloud meet the weather map (vsu2022: coverage shifts the map).
@@ -57,49 +59,51 @@ fn with_coverage(base: f32, coverage: f32) -> f32 {
 // Detail eats into the shape: wispy at the base, billowy above.
 fn eroded(shape: f32, detail: f32, height: f32) -> f32 {
     let modifier = mix(detail, 1.0 - detail, saturate(10.0 * height));
-    return remap01(shape, modifier * params.clouds.detail, 1.0);
+    return select(0.0, remap01(shape, modifier * params.clouds.detail, 1.0), shape > 0.0);
 }
 
-// `p` is relative to the camera, `width` the size of what one sample stands for, in metres.
-fn cloud_shape(p: vec3f, altitude: f32, width: f32) -> Shape {
+// The weather at a point `p`, relative to the camera.
+fn cloud_column(p: vec3f, altitude: f32) -> Column {
     evaluations += 1u;
     let height = (altitude - params.clouds.base) / (params.clouds.top - params.clouds.base);
-    var shape = Shape(0.0, height, 0.0, vec2f(0.0));
-    if height <= 0.0 || height >= 1.0 {
-        return shape;
-    }
-    shape.lean = height * params.wind.shear * frame.wind_direction;
-    let q = p.xy - shape.lean;
-    let uv = frame.weather_origin + vec2f(q.x, -q.y) / params.weather.extent;
+    let at = p.xy - height * params.wind.shear * frame.wind_direction;
+    let uv = frame.weather_origin + vec2f(at.x, -at.y) / params.weather.extent;
     let weather = weather_from_map(textureSampleLevel(weather_map, repeat_sampler, uv, 0.0).rgb);
-    shape.precipitation = weather.precipitation;
     let profile = height_profile(height, weather.kind);
-    // The noise is at most 1: where the profile alone does not rise above 1 - coverage there is nothing to read.
-    if profile <= 1.0 - weather.coverage || weather.coverage <= 0.0 {
-        return shape;
-    }
+    // The noise is at most 1: where the profile alone does not rise above 1 - coverage, nothing does.
+    let inside = height > 0.0 && height < 1.0;
+    let limit = select(0.0, with_coverage(profile, weather.coverage), inside);
+    return Column(limit, profile, weather.coverage, height, weather.precipitation, at);
+}
+
+// The base shape, before detail: cheap, and never smaller than the density. `width` is the size of what one sample
+// stands for, in metres.
+fn cloud_shape(column: Column, altitude: f32, width: f32) -> f32 {
     let lod = log2(max(width * 128.0 / params.clouds.shape_scale, 1.0));
-    let at = frame.shape_origin + vec3f(q, altitude) / params.clouds.shape_scale;
+    let at = frame.shape_origin + vec3f(column.at, altitude) / params.clouds.shape_scale;
     let noise = textureSampleLevel(shape_noise, repeat_sampler, at, lod);
-    shape.density = with_coverage(base_shape(noise) * profile, weather.coverage);
-    return shape;
+    let shape = with_coverage(base_shape(noise) * column.profile, column.coverage);
+    return select(0.0, shape, column.limit > 0.0);
 }
 
 // The density at a point whose shape is known.
-fn cloud_density(p: vec3f, altitude: f32, shape: Shape, width: f32) -> f32 {
-    if shape.density <= 0.0 {
-        return 0.0;
-    }
-    let q = p.xy - shape.lean;
-    let swirl = textureSampleLevel(curl_noise, repeat_sampler, frame.curl_origin + q / params.clouds.curl_scale, 0.0).xy;
-    let moved = vec3f(q + params.clouds.curl * (1.0 - shape.height) * swirl, altitude);
+fn cloud_density(column: Column, shape: f32, altitude: f32, width: f32) -> f32 {
+    let swirl = textureSampleLevel(curl_noise, repeat_sampler, frame.curl_origin + column.at / params.clouds.curl_scale, 0.0).xy;
+    let moved = vec3f(column.at + params.clouds.curl * (1.0 - column.height) * swirl, altitude);
     let lod = log2(max(width * 32.0 / params.clouds.detail_scale, 1.0));
     let at = frame.detail_origin + moved / params.clouds.detail_scale;
     let detail = fbm3(textureSampleLevel(detail_noise, repeat_sampler, at, lod).rgb);
-    return eroded(shape.density, detail, shape.height);
+    return eroded(shape, detail, column.height);
+}
+
+// The density with everything read.
+fn cloud_density_at(p: vec3f, altitude: f32, width: f32) -> f32 {
+    let column = cloud_column(p, altitude);
+    return cloud_density(column, cloud_shape(column, altitude, width), altitude, width);
 }
 
 // The density without reading the detail: eroded by its mean instead, so that light samples keep their mean.
-fn cloud_density_cheap(shape: Shape) -> f32 {
-    return remap01(shape.density, 0.5 * params.clouds.detail, 1.0);
+fn cloud_density_cheap(p: vec3f, altitude: f32, width: f32) -> f32 {
+    let shape = cloud_shape(cloud_column(p, altitude), altitude, width);
+    return remap01(shape, 0.5 * params.clouds.detail, 1.0);
 }

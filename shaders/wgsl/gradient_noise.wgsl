@@ -4,14 +4,14 @@
 
 // Perlin noise of `period` cells a tile, about -1 to 1 (Perlin 2002: quintic fade).
 fn perlin(p: vec3f, period: u32, salt: u32) -> f32 {
-    let q = p * f32(period);
+    let q = fract(p) * f32(period);
     let cell = vec3i(floor(q));
     let f = q - floor(q);
     let w = f * f * f * (f * (f * 6.0 - 15.0) + 10.0);
     var corner: array<f32, 8>;
     for (var i = 0; i < 8; i++) {
         let o = vec3i(i & 1, (i >> 1) & 1, i >> 2);
-        let gradient = random3(wrap_cell(cell + o, i32(period)), salt) * 2.0 - 1.0;
+        let gradient = random3(wrap_cell(cell + o, vec3i(i32(period))), salt) * 2.0 - 1.0;
         corner[i] = dot(gradient, f - vec3f(o));
     }
     let x = mix(
@@ -38,14 +38,18 @@ fn perlin_fbm(p: vec3f, period: u32, octaves: u32, salt: u32) -> f32 {
 
 // Inverted Worley noise (Worley 1996): 1 at the feature points, falling to 0 one cell away; blobs are bright.
 fn worley(p: vec3f, period: u32, salt: u32) -> f32 {
-    let q = p * f32(period);
+    let q = fract(p) * f32(period);
     let cell = vec3i(floor(q));
     let f = q - floor(q);
     var nearest = 1.0;
-    for (var i = 0; i < 27; i++) {
-        let o = vec3i(i % 3, (i / 3) % 3, i / 9) - 1;
-        let d = vec3f(o) + random3(wrap_cell(cell + o, i32(period)), salt) - f;
-        nearest = min(nearest, dot(d, d));
+    for (var z = -1; z <= 1; z++) {
+        for (var y = -1; y <= 1; y++) {
+            for (var x = -1; x <= 1; x++) {
+                let o = vec3i(x, y, z);
+                let d = vec3f(o) + random3(wrap_cell(cell + o, vec3i(i32(period))), salt) - f;
+                nearest = min(nearest, dot(d, d));
+            }
+        }
     }
     return 1.0 - sqrt(nearest);
 }

@@ -21,27 +21,34 @@ fn optical_depth_to_sun(p: vec3f, opacity: f32, width: f32) -> f32 {
     let reach = quality.light_distance;
     let cone = select(params.light.cone, 0.0, params.light.model == MODEL_SINGLE);
     var depth = 0.0;
-    for (var i = 0u; i < n + quality.far_sample; i++) {
-        let a = f32(i) / f32(n);
-        let b = f32(i + 1u) / f32(n);
-        let is_far = i == n;
-        let length = select((b * b - a * a) * reach, 4.0 * reach, is_far);
-        let s = select(0.5 * (b * b + a * a) * reach, 3.0 * reach, is_far);
-        let at = p + s * (frame.sun_direction + cone * CONE[i % 6u]);
-        let altitude = altitude_at(at);
-        let sample_width = max(width, 0.5 * length);
-        let shape = cloud_shape(at, altitude, sample_width);
-        if shape.density > 0.0 {
-            var density: f32;
-            if opacity < quality.cheap_light && !is_far {
-                density = cloud_density(at, altitude, shape, sample_width);
-            } else {
-                density = cloud_density_cheap(shape);
-            }
-            depth += density * params.clouds.extinction * length;
-        }
+    // Behind little cloud the near samples see the detail; the others are cheap.
+    let full = select(0u, n, opacity < quality.cheap_light);
+    for (var i = 0u; i < full; i++) {
+        let at = light_sample(p, i, n, reach, cone, width);
+        depth += cloud_density_at(at.p, at.altitude, at.width) * at.length;
     }
-    return depth;
+    for (var i = full; i < n + quality.far_sample; i++) {
+        let at = light_sample(p, i, n, reach, cone, width);
+        depth += cloud_density_cheap(at.p, at.altitude, at.width) * at.length;
+    }
+    return depth * params.clouds.extinction;
+}
+
+struct LightSample {
+    p: vec3f,
+    altitude: f32,
+    length: f32, // of the stretch it stands for
+    width: f32,
+}
+
+fn light_sample(p: vec3f, i: u32, n: u32, reach: f32, cone: f32, width: f32) -> LightSample {
+    let a = f32(i) / f32(n);
+    let b = f32(i + 1u) / f32(n);
+    let is_far = i == n;
+    let length = select((b * b - a * a) * reach, 4.0 * reach, is_far);
+    let s = select(0.5 * (b * b + a * a) * reach, 3.0 * reach, is_far);
+    let at = p + s * (frame.sun_direction + cone * CONE[i % 6u]);
+    return LightSample(at, altitude_at(at), length, max(width, 0.5 * length));
 }
 
 // The phase function of the light model: Henyey-Greenstein, or two lobes of it.

@@ -19,7 +19,9 @@ fn random3(cell: vec3u, salt: u32) -> vec3f {
     return vec3f(hash >> vec3u(8u)) / 16777216.0;
 }
 
-// The cell of a lattice that repeats after `period` cells.
-fn wrap_cell(cell: vec3i, period: i32) -> vec3u {
-    return vec3u((cell % period + period) % period);
+// The cell of a lattice that repeats after `period` cells, for cells at most one period out. Integer division has no
+// vector instruction: with it the noise bake takes ten times as long on lavapipe.
+fn wrap_cell(cell: vec3i, period: vec3i) -> vec3u {
+    let up = select(cell, cell + period, cell < vec3i(0));
+    return vec3u(select(up, up - period, up >= period));
 }

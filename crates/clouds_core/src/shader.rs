@@ -84,6 +84,11 @@ pub fn read(name: &str) -> Option<String> {
     match name {
         "params" => Some(params_source()),
         "frame" => Some(wgsl_struct(&Frame::default())),
+        _ if std::env::var_os("NUBIS_SHADERS").is_some() => {
+            // For work on shaders: read from a folder, without building anything again.
+            let folder = std::env::var_os("NUBIS_SHADERS").unwrap_or_default();
+            std::fs::read_to_string(std::path::Path::new(&folder).join(format!("{name}.wgsl"))).ok()
+        }
         _ => SHADERS.iter().find(|(file, _)| *file == name).map(|(_, source)| (*source).to_owned()),
     }
 }

@@ -35,16 +35,15 @@ fn high_clouds(@builtin(global_invocation_id) id: vec3u) {
 fn streaks(p: vec3f, period: u32, salt: u32) -> f32 {
     let across = max(u32(round(f32(period) * sqrt(params.high_clouds.stretch))), 1u);
     let along = max(u32(round(f32(period) / sqrt(params.high_clouds.stretch))), 1u);
-    let q = p.xy * vec2f(f32(along), f32(across));
+    let q = fract(p.xy) * vec2f(f32(along), f32(across));
     let cell = vec2i(floor(q));
     let f = q - floor(q);
     let w = f * f * f * (f * (f * 6.0 - 15.0) + 10.0);
     var corner: array<f32, 4>;
     for (var i = 0; i < 4; i++) {
         let o = vec2i(i & 1, i >> 1);
-        let wrapped = vec2i((cell.x + o.x) % i32(along), (cell.y + o.y) % i32(across));
-        let positive = (wrapped + vec2i(i32(along), i32(across))) % vec2i(i32(along), i32(across));
-        let gradient = random3(vec3u(vec2u(positive), 0u), salt).xy * 2.0 - 1.0;
+        let wrapped = wrap_cell(vec3i(cell + o, 0), vec3i(i32(along), i32(across), 1));
+        let gradient = random3(wrapped, salt).xy * 2.0 - 1.0;
         corner[i] = dot(gradient, f - vec2f(o));
     }
     return 1.4 * mix(mix(corner[0], corner[1], w.x), mix(corner[2], corner[3], w.x), w.y);

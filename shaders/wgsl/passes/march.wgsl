@@ -63,6 +63,24 @@ fn step_distance(steps: Steps, i: f32) -> f32 {
     return (exp2(steps.scale * i) - 1.0) / steps.growth;
 }
 
+// A place on the ray.
+struct Sample {
+    p: vec3f,
+    t: f32,
+    altitude: f32,
+    length: f32, // of the step it stands for
+    width: f32, // a pixel across, or a good part of the step along the ray, whichever is more
+}
+
+fn march_sample(s: Stretches, steps: Steps, direction: vec3f, offset: f32, i: u32, pixel_size: f32) -> Sample {
+    let begin = step_distance(steps, f32(i));
+    let length = step_distance(steps, f32(i + 1u)) - begin;
+    let from_start = begin + offset * length;
+    let t = s.start + from_start + select(0.0, s.gap, from_start > s.first);
+    let p = t * direction;
+    return Sample(p, t, altitude_at(p), length, max(t * pixel_size, 0.3 * length));
+}
+
 fn march_ray(direction: vec3f, offset: f32) -> Cloud {
     let stretches = cloud_stretches(direction);
     let room = max(quality.view_distance - stretches.start, 0.0);
@@ -83,62 +101,67 @@ fn march_ray(direction: vec3f, offset: f32) -> Cloud {
     var distance_sum = 0.0;
 
     let big = quality.big_step;
-    var searching = true; // cheap samples, big steps
-    var empty = 0u;
+    var i = 0u; // the step at hand
     var seen = 0u; // steps below this one have had their full sample
-    var i = 0u;
-    // Going back repeats at most `big` steps for every full stretch, so three times the steps is never reached.
-    let limit = 3u * steps.count + 2u * big;
-    for (var iteration = 0u; iteration < limit; iteration++) {
+    // Loops in loops, and no branch with much behind it: lavapipe runs both sides of every branch, and skips only
+    // loops that none of its eight rays is in. On a GPU, too, rays then wait for each other before the dear parts and
+    // do them together. Every round ends with a step that no later round takes again, so they are counted.
+    for (var round = 0u; round < steps.count; round++) {
+        // Outside: big steps, and the weather alone until it allows for cloud, then the shape.
+        while i < steps.count {
+            var at: Sample;
+            var column: Column;
+            while i < steps.count {
+                at = march_sample(stretches, steps, direction, offset, i, pixel_size);
+                column = cloud_column(at.p, at.altitude);
+                if column.limit > 0.0 {
+                    break;
+                }
+                i += big;
+            }
+            if i >= steps.count || cloud_shape(column, at.altitude, at.width) > 0.0 {
+                break;
+            }
+            i += big;
+        }
         if i >= steps.count {
             break;
         }
-        let from_start = step_distance(steps, f32(i) + offset);
-        let step = step_distance(steps, f32(i + 1u)) - step_distance(steps, f32(i));
-        let t = stretches.start + from_start + select(0.0, stretches.gap, from_start > stretches.first);
-        let p = t * direction;
-        let altitude = altitude_at(p);
-        // What one sample stands for: a pixel across, and a good part of a step along the ray.
-        let width = max(t * pixel_size, 0.3 * step);
-        let shape = cloud_shape(p, altitude, width);
+        // Back by the steps that were leapt over.
+        i = max(i - min(i, big - 1u), seen);
 
-        if searching {
-            if shape.density <= 0.0 {
-                i += big;
-                continue;
+        // Inside: full samples of every step, until too many in a row are empty.
+        var empty = 0u;
+        while i < steps.count && empty < quality.empty_samples && transmittance >= quality.min_transmittance {
+            var at: Sample;
+            var column: Column;
+            var density = 0.0;
+            while i < steps.count && empty < quality.empty_samples && density <= 0.0 {
+                at = march_sample(stretches, steps, direction, offset, i, pixel_size);
+                column = cloud_column(at.p, at.altitude);
+                let shape = cloud_shape(column, at.altitude, at.width);
+                density = cloud_density(column, shape, at.altitude, at.width);
+                i += 1u;
+                empty += 1u;
             }
-            searching = false;
-            empty = 0u;
-            let back = max(i - min(i, big - 1u), seen);
-            if back < i {
-                i = back;
-                continue;
+            if density > 0.0 {
+                empty = 0u;
+                let x = density * params.clouds.extinction * at.length;
+                let weight = transmittance * x * one_minus_exp_over(x);
+                var depth_to_sun = 0.0;
+                if sunlit {
+                    depth_to_sun = optical_depth_to_sun(at.p, 1.0 - transmittance, at.width);
+                }
+                let above = ambient_share(column.height);
+                sun += weight * sun_energy(depth_to_sun, column.precipitation);
+                ambient_top += weight * above;
+                ambient_bottom += weight * (1.0 - above);
+                weight_sum += weight;
+                distance_sum += weight * at.t;
+                transmittance *= exp(-x);
             }
         }
-        i += 1u;
         seen = i;
-
-        let density = cloud_density(p, altitude, shape, width);
-        if density <= 0.0 {
-            empty += 1u;
-            searching = empty >= quality.empty_samples;
-            continue;
-        }
-        empty = 0u;
-
-        let x = density * params.clouds.extinction * step;
-        let weight = transmittance * x * one_minus_exp_over(x);
-        var depth_to_sun = 0.0;
-        if sunlit {
-            depth_to_sun = optical_depth_to_sun(p, 1.0 - transmittance, width);
-        }
-        let above = ambient_share(shape.height);
-        sun += weight * sun_energy(depth_to_sun, shape.precipitation);
-        ambient_top += weight * above;
-        ambient_bottom += weight * (1.0 - above);
-        weight_sum += weight;
-        distance_sum += weight * t;
-        transmittance *= exp(-x);
         if transmittance < quality.min_transmittance {
             break;
         }

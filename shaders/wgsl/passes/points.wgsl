@@ -12,8 +12,7 @@ fn extinction_at_points(@builtin(global_invocation_id) id: vec3u) {
     }
     let p = points[id.x].xyz;
     let altitude = altitude_at(p);
-    let shape = cloud_shape(p, altitude, 0.0);
-    results[id.x] = vec4f(cloud_density(p, altitude, shape, 0.0) * params.clouds.extinction, 0.0, 0.0, 0.0);
+    results[id.x] = vec4f(cloud_density_at(p, altitude, 0.0) * params.clouds.extinction, 0.0, 0.0, 0.0);
 }
 
 // Step of the march toward the sun, m: half a texel of the base shape at its default scale.
@@ -51,9 +50,7 @@ fn sun_transmittance_at_points(@builtin(global_invocation_id) id: vec3u) {
             let from_start = (i + 0.5) / steps * length;
             let t = s.start + from_start + select(0.0, s.gap, from_start > s.first);
             let q = p + t * frame.sun_direction;
-            let altitude = altitude_at(q);
-            let shape = cloud_shape(q, altitude, 0.0);
-            depth += cloud_density(q, altitude, shape, 0.0);
+            depth += cloud_density_at(q, altitude_at(q), 0.0);
         }
         depth *= params.clouds.extinction * length / steps;
     }

@@ -23,7 +23,7 @@ fn perlin(p: vec3f, period: u32, salt: u32) -> f32 {
     return mix(y.x, y.y, w.z);
 }
 
-// FBM of Perlin noise from `period` cells a tile up, mapped to [0, 1] with mean 0.5.
+// FBM of Perlin noise from `period` cells a tile up, mapped to [0, 1] with mean 0.5 and standard deviation 0.2.
 fn perlin_fbm(p: vec3f, period: u32, octaves: u32, salt: u32) -> f32 {
     var sum = 0.0;
     var amplitude = 1.0;
@@ -33,7 +33,7 @@ fn perlin_fbm(p: vec3f, period: u32, octaves: u32, salt: u32) -> f32 {
         total += amplitude;
         amplitude *= 0.5;
     }
-    return saturate(0.5 + 0.5 * sum / total);
+    return saturate(0.5 + 0.85 * sum / total);
 }
 
 // Inverted Worley noise (Worley 1996): 1 at the feature points, falling to 0 one cell away; blobs are bright.
@@ -54,8 +54,8 @@ fn worley(p: vec3f, period: u32, salt: u32) -> f32 {
     return 1.0 - sqrt(nearest);
 }
 
-// Perlin noise with the billows of Worley noise: nubis2015 raises the old minimum of the Perlin range by a Worley FBM.
-// Worley's dark cell borders carve the Perlin noise here, so that round shapes stay.
+// Perlin noise with the billows of Worley noise: nubis2015 raises the old minimum of the Perlin range to a Worley FBM.
+// `worley` is inverted, so it is the dark borders of its cells that carve, and round shapes stay.
 fn perlin_worley(perlin: f32, worley: f32) -> f32 {
     return remap01(perlin, 1.0 - worley, 1.0);
 }

@@ -12,5 +12,5 @@ fn high_optical_depth(p: vec3f) -> f32 {
     // another scale breaks the tiles up.
     let broad = textureSampleLevel(high_map, repeat_sampler, uv * 0.31 + 0.37, 0.0).r;
     let over = max(mix(noise, broad, 0.4) - (1.0 - params.high_clouds.coverage), 0.0);
-    return params.high_clouds.optical_depth * (1.0 - exp(-4.0 * over));
+    return params.high_clouds.optical_depth * (1.0 - exp(-3.0 * over * over / (over + 0.15)));
 }

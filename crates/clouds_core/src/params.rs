@@ -41,7 +41,7 @@ params! {
         /// Compass direction, clockwise from north.
         azimuth: f32 = 120.0, in -360..=360 "degrees";
         /// Irradiance on a plane that faces the sun, above the atmosphere (linear Rec. 709).
-        irradiance: [f32; 3] = [5.0, 5.0, 5.0], in 0..=1000000 "";
+        irradiance: [f32; 3] = [10.0, 10.0, 10.0], in 0..=1000000 "";
         /// Whether the sun's disc is drawn.
         visible: bool = true;
     }

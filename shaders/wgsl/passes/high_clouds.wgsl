@@ -12,7 +12,7 @@ fn high_clouds(@builtin(global_invocation_id) id: vec3u) {
     // Streaks lie along x: fewer cells along than across. The field is swirled so that they are not ruled lines.
     let seed = params.high_clouds.seed * 61u;
     let swirl = vec3f(perlin(p, 3u, seed + 51u), perlin(p, 3u, seed + 52u), 0.0);
-    let at = p + 0.06 * swirl;
+    let at = p + 0.1 * swirl;
     var sum = 0.0;
     var total = 0.0;
     var amplitude = 1.0;
@@ -26,9 +26,9 @@ fn high_clouds(@builtin(global_invocation_id) id: vec3u) {
         let steady = inverseSqrt(age * age + (1.0 - age) * (1.0 - age));
         sum += amplitude * mix(before, after, age) * steady;
         total += amplitude;
-        amplitude *= 0.5;
+        amplitude *= 0.62;
     }
-    textureStore(map_out, id.xy, vec4f(vec3f(saturate(0.5 + 0.9 * sum / total)), 1.0));
+    textureStore(map_out, id.xy, vec4f(vec3f(saturate(0.5 + 0.75 * sum / total)), 1.0));
 }
 
 // Perlin noise stretched along x by squeezing its cells across; whole cells a tile either way, so it tiles.

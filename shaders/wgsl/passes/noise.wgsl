@@ -12,8 +12,14 @@ fn tile_point(id: vec3u, size: vec3u) -> vec3f {
     return (vec3f(id) + 0.5) / vec3f(size);
 }
 
-// 128^3: R Perlin-Worley; G, B, A Worley FBMs of rising frequency. The five Worley octaves are computed once and shared.
-// vsu2022: Perlin-Worley of rising frequency in all four.
+// A Worley FBM keeps to the middle of its range (nine in ten values from 0.28 to 0.68); spread over all of it, it shapes.
+fn stretched(worley: f32) -> f32 {
+    return remap01(worley, 0.2, 0.75);
+}
+
+// 128^3: R Perlin-Worley; G, B, A Worley FBMs of rising frequency, dark at the feature points, as the sampler's
+// remap(R, -(1 - fbm(GBA)), 1, 0, 1) wants them. The five Worley octaves are computed once and shared.
+// vsu2022: Perlin-Worley of rising frequency in all four, G, B, A in the same sense.
 @compute @workgroup_size(4, 4, 4)
 fn shape(@builtin(global_invocation_id) id: vec3u) {
     let size = textureDimensions(volume_out);
@@ -26,15 +32,15 @@ fn shape(@builtin(global_invocation_id) id: vec3u) {
     for (var i = 0u; i < 5u; i++) {
         w[i] = worley(p, 3u << i, seed + WORLEY_SALT + i);
     }
-    let r = fbm3(vec3f(w[0], w[1], w[2]));
-    let g = fbm3(vec3f(w[1], w[2], w[3]));
-    let b = fbm3(vec3f(w[2], w[3], w[4]));
-    let a = 0.75 * w[3] + 0.25 * w[4];
-    var texel = vec4f(perlin_worley(perlin_fbm(p, 3u, 5u, seed + PERLIN_SALT), r), g, b, a);
+    let r = stretched(fbm3(vec3f(w[0], w[1], w[2])));
+    let g = stretched(fbm3(vec3f(w[1], w[2], w[3])));
+    let b = stretched(fbm3(vec3f(w[2], w[3], w[4])));
+    let a = stretched(0.75 * w[3] + 0.25 * w[4]);
+    var texel = vec4f(perlin_worley(perlin_fbm(p, 3u, 5u, seed + PERLIN_SALT), r), 1.0 - g, 1.0 - b, 1.0 - a);
     if params.clouds.noise == NOISE_VSU2022 {
-        texel.g = perlin_worley(perlin_fbm(p, 6u, 4u, seed + PERLIN_SALT + 5u), g);
-        texel.b = perlin_worley(perlin_fbm(p, 12u, 3u, seed + PERLIN_SALT + 9u), b);
-        texel.a = perlin_worley(perlin_fbm(p, 24u, 2u, seed + PERLIN_SALT + 12u), a);
+        texel.g = 1.0 - perlin_worley(perlin_fbm(p, 6u, 4u, seed + PERLIN_SALT + 5u), g);
+        texel.b = 1.0 - perlin_worley(perlin_fbm(p, 12u, 3u, seed + PERLIN_SALT + 9u), b);
+        texel.a = 1.0 - perlin_worley(perlin_fbm(p, 24u, 2u, seed + PERLIN_SALT + 12u), a);
     }
     textureStore(volume_out, id, texel);
 }
@@ -53,9 +59,9 @@ fn detail(@builtin(global_invocation_id) id: vec3u) {
         w[i] = worley(p, 2u << i, seed + i);
     }
     var texel = vec3f(
-        fbm3(vec3f(w[0], w[1], w[2])),
-        fbm3(vec3f(w[1], w[2], w[3])),
-        0.75 * w[2] + 0.25 * w[3],
+        stretched(fbm3(vec3f(w[0], w[1], w[2]))),
+        stretched(fbm3(vec3f(w[1], w[2], w[3]))),
+        stretched(0.75 * w[2] + 0.25 * w[3]),
     );
     if params.clouds.noise == NOISE_VSU2022 {
         for (var i = 0u; i < 3u; i++) {

@@ -21,9 +21,9 @@ fn weather(@builtin(global_invocation_id) id: vec3u) {
     // Clouds stand where Worley's blobs are, and lean on a Perlin noise so that no two are alike.
     let blobs = worley(p, cells, seed + COVERAGE_SALT) * 0.6 + worley(p, cells * 2u, seed + COVERAGE_SALT + 1u) * 0.4;
     let shape = perlin_fbm(p, cells, 4u, seed + COVERAGE_SALT + 2u);
-    let local = remap01(0.55 * blobs + 0.9 * (shape - 0.5) + 0.25, 0.15, 0.95);
     let broad = perlin_fbm(p, broad_cells, 3u, seed + COVERAGE_SALT + 9u) - 0.5;
-    let coverage = saturate(local + 1.6 * params.weather.variety * broad);
+    let sum = 0.9 * blobs + 0.7 * (shape - 0.5) + params.weather.variety * broad;
+    let coverage = remap01(sum, 0.2, 0.7);
 
     let kind = saturate(0.5 + 0.9 * (perlin_fbm(p, max(cells / 3u, 1u), 3u, seed + TYPE_SALT) - 0.5));
     let rain = remap01(perlin_fbm(p, broad_cells, 2u, seed + RAIN_SALT) + 0.3 * (coverage - 0.5), 0.3, 0.7);

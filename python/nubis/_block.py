@@ -31,9 +31,7 @@ class Base:
 
     def _key(self) -> tuple[Any, ...]:
         values = (getattr(self, f.name) for f in dataclasses.fields(self))
-        return tuple(
-            (v.shape, v.tobytes()) if isinstance(v, np.ndarray) else v for v in values
-        )
+        return tuple((v.shape, v.tobytes()) if isinstance(v, np.ndarray) else v for v in values)
 
     def __eq__(self, other: object) -> bool:
         if type(other) is not type(self):

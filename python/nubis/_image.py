@@ -95,7 +95,9 @@ def _pixels(frame: Any) -> npt.NDArray[np.float32]:
     try:
         pixels = np.ascontiguousarray(frame, dtype=np.float32)
     except (TypeError, ValueError) as error:
-        raise ParameterError(f"frame is not allowed: it must be an array of numbers ({error})") from None
+        raise ParameterError(
+            f"frame is not allowed: it must be an array of numbers ({error})"
+        ) from None
     if pixels.ndim != 3 or pixels.shape[2] not in (3, 4) or 0 in pixels.shape:
         raise ParameterError(
             f"frame of shape {pixels.shape} is not allowed: it must be (H, W, 3) or (H, W, 4)"

@@ -92,7 +92,9 @@ class Renderer:
         adapter: int | str | None = None,
     ) -> None:
         self._quality = quality if isinstance(quality, Quality) else _named(quality)
-        if adapter is not None and (isinstance(adapter, bool) or not isinstance(adapter, int | str)):
+        if adapter is not None and (
+            isinstance(adapter, bool) or not isinstance(adapter, int | str)
+        ):
             raise ParameterError(
                 f"adapter = {adapter!r} is not allowed: it must be an index or a part of a name"
             )

@@ -34,31 +34,36 @@ def _make() -> dict[str, tuple[Camera, Params]]:
         ),
         "stratocumulus": (
             _look((0, 0, 200), 340, 16),
-            fair.with_(**{"clouds.coverage": 0.65, "clouds.type": 0.5, "sun.elevation": 30.0}),
+            fair.with_(**{"clouds.coverage": 0.62, "clouds.type": 0.5, "sun.elevation": 30.0}),
         ),
         "storm": (
-            _look((0, 0, 200), 70, 14),
+            _look((0, 0, 200), 40, 14),
             fair.with_(
                 **{
-                    "clouds.coverage": 0.75,
-                    "clouds.precipitation": 1.0,
-                    "clouds.top": 6000.0,
-                    "sun.elevation": 25.0,
+                    "clouds.coverage": 0.6,
+                    "clouds.precipitation": 0.9,
+                    "clouds.base": 900.0,
+                    "clouds.top": 5500.0,
+                    "sun.elevation": 28.0,
+                    "sun.azimuth": 140.0,
                 }
             ),
         ),
         "sunset": (
             _look((0, 0, 200), 250, 11),
-            fair.with_(**{"sun.elevation": 3.0, "sun.azimuth": 258.0, "clouds.coverage": 0.45}),
+            fair.with_(**{"sun.elevation": 3.0, "sun.azimuth": 258.0}),
         ),
-        "in_cloud": (_look((0, 0, 1900), 20, 4), fair.with_(**{"clouds.coverage": 0.6})),
+        "in_cloud": (
+            _look((0, 0, 1800), 200, 6),
+            fair.with_(**{"clouds.coverage": 0.5, "sun.azimuth": 230.0}),
+        ),
         "above": (
-            _look((0, 0, 4500), 20, -10),
-            fair.with_(**{"sun.elevation": 30.0, "sun.azimuth": 320.0, "clouds.coverage": 0.55}),
+            _look((0, 0, 3500), 20, -10),
+            fair.with_(**{"sun.elevation": 30.0, "sun.azimuth": 320.0}),
         ),
         "cirrus": (
             _look((0, 0, 200), 300, 25),
-            fair.with_(**{"clouds.coverage": 0.2, "high_clouds.coverage": 0.6}),
+            fair.with_(**{"clouds.coverage": 0.25, "high_clouds.coverage": 0.6}),
         ),
     }
 

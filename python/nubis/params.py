@@ -33,7 +33,7 @@ class Sun(Block):
 
     elevation: float = 40.0
     azimuth: float = 120.0
-    irradiance: tuple[float, float, float] = (5.0, 5.0, 5.0)
+    irradiance: tuple[float, float, float] = (10.0, 10.0, 10.0)
     visible: bool = True
 
 
@@ -80,12 +80,12 @@ class Clouds(Block):
     precipitation: float = 0.0
     base: float = 1200.0
     top: float = 3200.0
-    extinction: float = 0.06
+    extinction: float = 0.15
     seed: int = 1
     noise: Literal["nubis2015", "vsu2022"] = "nubis2015"
     shape_scale: float = 5200.0
     detail_scale: float = 640.0
-    detail: float = 0.25
+    detail: float = 0.38
     curl_scale: float = 2400.0
     curl: float = 90.0
 
@@ -155,7 +155,8 @@ class Wind(Block):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class HighClouds(Block):
-    """The thin high clouds, a layer without thickness on its own sphere (nubis2015; animated as in gems2001).
+    """The thin high clouds, a layer without thickness on its own sphere (nubis2015; animated as in
+    gems2001).
 
     Attributes
     ----------
@@ -249,8 +250,8 @@ class Light(Block):
     g_back: float = -0.25
     lobe_mix: float = 0.5
     albedo: float = 0.999
-    sun_gain: float = 6.0
-    absorption: float = 0.12
+    sun_gain: float = 2.2
+    absorption: float = 0.18
     ambient_gain: float = 1.0
     ambient_top: tuple[float, float, float] = (1.0, 1.0, 1.0)
     ambient_bottom: tuple[float, float, float] = (1.0, 1.0, 1.0)
@@ -355,7 +356,8 @@ class Params(Root):
     wind : Wind
         What moves the clouds.
     high_clouds : HighClouds
-        The thin high clouds, a layer without thickness on its own sphere (nubis2015; animated as in gems2001).
+        The thin high clouds, a layer without thickness on its own sphere (nubis2015; animated as in
+        gems2001).
     light : Light
         How light becomes colour.
     atmosphere : Atmosphere

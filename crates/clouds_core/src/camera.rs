@@ -115,14 +115,7 @@ impl Camera {
     /// The whole sphere around `eye`: image centre north, right clockwise from above, top the zenith.
     pub fn equirect(eye: DVec3) -> Result<Self> {
         let eye = finite("eye", eye, FARTHEST_EYE)?;
-        Ok(Self {
-            projection: Projection::Equirect,
-            eye,
-            right: DVec3::X,
-            up: DVec3::Z,
-            forward: DVec3::Y,
-            fov: 360.0,
-        })
+        Ok(Self { projection: Projection::Equirect, eye, right: DVec3::X, up: DVec3::Z, forward: DVec3::Y, fov: 360.0 })
     }
 
     /// An all-sky camera that looks along `up`: centre of the image `up`, its top as far north as can be, equidistant.

@@ -19,6 +19,7 @@ fn encode_srgb(v: f32) -> f32 {
 
 /// AgX (Troy Sobotka), in the polynomial form of Benjamin Wrensch ("Minimal AgX Implementation", 2023) for Rec. 709
 /// primaries; its output is display-encoded.
+#[expect(clippy::excessive_precision, reason = "as published")]
 fn agx(v: Rgb) -> Rgb {
     const INSET: [[f32; 3]; 3] = [
         [0.842_479_06, 0.078_433_6, 0.079_223_745],

@@ -186,7 +186,8 @@ impl Frame {
         self.curl_origin = plane(drifted(wind.detail_speed), clouds.curl_scale);
 
         // The middle of the weather map is the origin of the world, its first row the north.
-        let weather = eye.truncate() - compass(f64::from(wind.weather_direction)) * f64::from(wind.weather_speed) * time;
+        let weather =
+            eye.truncate() - compass(f64::from(wind.weather_direction)) * f64::from(wind.weather_speed) * time;
         let half = 0.5 * f64::from(params.weather.extent);
         self.weather_origin = plane(DVec2::new(weather.x + half, half - weather.y), params.weather.extent);
 
@@ -222,6 +223,7 @@ impl Frame {
         let weather = compass(f64::from(wind.weather_direction)) * f64::from(wind.weather_speed);
         let shape = compass(f64::from(wind.direction)) * f64::from(wind.speed);
         let rise = f64::from(wind.updraft);
-        self.cloud_motion = ((weather + shape) * 0.5).extend(0.5 * rise).as_vec3().map(|v| v * elapsed as f32).to_array();
+        self.cloud_motion =
+            ((weather + shape) * 0.5).extend(0.5 * rise).as_vec3().map(|v| v * elapsed as f32).to_array();
     }
 }

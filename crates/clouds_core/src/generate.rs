@@ -65,7 +65,8 @@ fn wrapped(text: &str, indent: &str) -> String {
 
 fn dataclass(out: &mut String, block: &dyn Block) {
     let _ = writeln!(out, "\n\n@dataclass(frozen=True, kw_only=True, eq=False)\nclass {}(Block):", block.type_name());
-    let _ = writeln!(out, "    \"\"\"{}\n\n    Attributes\n    ----------", block.doc().trim());
+    out.push_str(&wrapped(&format!("\"\"\"{}", block.doc().trim()), "    "));
+    out.push_str("\n    Attributes\n    ----------\n");
     for field in block.fields() {
         let ty = match field.ty {
             Type::Map => "array of float32, shape (H, W, 3), or None".into(),
@@ -78,7 +79,12 @@ fn dataclass(out: &mut String, block: &dyn Block) {
     out.push_str("    \"\"\"\n\n");
     for (index, field) in block.fields().iter().enumerate() {
         let value = python_value(&block.get(index));
-        let _ = writeln!(out, "    {}: {} = {value}", field.name, python_type(field));
+        let mut line = format!("    {}: {} = {value}", field.name, python_type(field));
+        if line.len() > 100 {
+            // As `ruff format` breaks it.
+            line = line.replace("Literal[", "Literal[\n        ").replace("] = ", "\n    ] = ");
+        }
+        let _ = writeln!(out, "{line}");
     }
 }
 
@@ -104,7 +110,8 @@ fn python() -> String {
          Attributes\n    ----------\n",
     );
     for (name, block) in params.blocks() {
-        let _ = writeln!(out, "    {name} : {}\n        {}", block.type_name(), block.doc().trim());
+        let _ = writeln!(out, "    {name} : {}", block.type_name());
+        out.push_str(&wrapped(block.doc(), "        "));
     }
     out.push_str("    \"\"\"\n\n");
     for (name, block) in params.blocks() {
@@ -122,10 +129,10 @@ fn manual() -> String {
     let params = Params::default();
     let quality = Quality::default();
     let blocks = params.blocks();
-    let all = blocks.iter().map(|(name, block)| (format!("`{name}`"), *block)).chain([(
-        "`quality` (`nubis.Quality`)".to_owned(),
-        &quality as &dyn Block,
-    )]);
+    let all = blocks
+        .iter()
+        .map(|(name, block)| (format!("`{name}`"), *block))
+        .chain([("`quality` (`nubis.Quality`)".to_owned(), &quality as &dyn Block)]);
     for (name, block) in all {
         let _ = writeln!(out, "\n## {name}\n\n{}\n", block.doc().trim());
         out.push_str("| field | default | allowed | what |\n| --- | --- | --- | --- |\n");

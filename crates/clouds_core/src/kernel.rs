@@ -55,6 +55,7 @@ impl Kernel {
         Self::from_linked(gpu, &linked, entry)
     }
 
+    #[expect(clippy::disallowed_methods, reason = "the one place that makes pipelines")]
     pub(crate) fn from_linked(gpu: &Gpu, linked: &Linked, entry: &str) -> Result<Self> {
         let (module, info) = linked.parse().map_err(Error::Device)?;
         let index = module
@@ -70,7 +71,7 @@ impl Kernel {
         };
         let checks = wgpu::ShaderRuntimeChecks { force_loop_bounding: false, ..Default::default() };
         // SAFETY: only loop bounding is off, which costs a counter in every loop (ten times the time on some drivers,
-        // gfx-rs/wgpu#7698). The shaders are this crate's own, and each of their loops is counted. Bounds checks stay.
+        // gfx-rs/wgpu#7698). The shaders are this crate's own, and each of their loops ends. Bounds checks stay.
         let shader = unsafe { gpu.device.create_shader_module_trusted(descriptor, checks) };
         let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label: Some(entry),

@@ -59,7 +59,7 @@ params! {
         /// Altitude of the highest cloud tops.
         top: f32 = 3200.0, in 1..=25000 "m";
         /// Extinction where the density is 1.
-        extinction: f32 = 0.06, in 0..=100000000 "1/m";
+        extinction: f32 = 0.15, in 0..=100000000 "1/m";
         /// Which random shapes.
         seed: u32 = 1, in 0..=4294967295.0 "";
         /// Which noises the shapes are made of.
@@ -69,7 +69,7 @@ params! {
         /// Width of one tile of the detail that erodes the edges.
         detail_scale: f32 = 640.0, in 10..=50000 "m";
         /// How deep the detail erodes the edges (nubis2015: 0.2).
-        detail: f32 = 0.25, in 0..=1 "";
+        detail: f32 = 0.38, in 0..=1 "";
         /// Width of one tile of the curl noise that swirls the detail.
         curl_scale: f32 = 2400.0, in 10..=50000 "m";
         /// How far curl noise displaces the detail at the base.
@@ -147,9 +147,9 @@ params! {
         /// Single-scattering albedo of a droplet (`single`).
         albedo: f32 = 0.999, in 0..=1 "";
         /// Gain of the sunlight in the models that do not conserve energy (all but `single`).
-        sun_gain: f32 = 6.0, in 0..=1000 "";
+        sun_gain: f32 = 2.2, in 0..=1000 "";
         /// How thick the models that do not conserve energy take the cloud to be on the way to the sun (all but `single`).
-        absorption: f32 = 0.12, in 0..=10 "";
+        absorption: f32 = 0.18, in 0..=10 "";
         /// Gain of the ambient light (all but `single`).
         ambient_gain: f32 = 1.0, in 0..=1000 "";
         /// Tint of the ambient light at the top of the clouds; its brightness comes from the sky.

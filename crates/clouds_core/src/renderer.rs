@@ -181,7 +181,11 @@ impl Renderer {
         if 16 * pixels > self.gpu.max_buffer {
             let most = self.gpu.max_buffer / 16;
             let size = format!("{width} x {height}");
-            return Err(Error::parameter("width x height", size, format!("at most {most} pixels for animate on this adapter")));
+            return Err(Error::parameter(
+                "width x height",
+                size,
+                format!("at most {most} pixels for animate on this adapter"),
+            ));
         }
         let cells = [width.div_ceil(STRIDE), height.div_ceil(STRIDE)];
         let Self { gpu, world, quality, timings, .. } = self;
@@ -249,7 +253,13 @@ impl Renderer {
     }
 
     /// Extinction in 1/m at world points: the field that [`Renderer::render`] marches.
-    pub fn density(&mut self, at: &[[f64; 3]], params: &Params, time: f64, interrupt: Interrupt<'_>) -> Result<Vec<f32>> {
+    pub fn density(
+        &mut self,
+        at: &[[f64; 3]],
+        params: &Params,
+        time: f64,
+        interrupt: Interrupt<'_>,
+    ) -> Result<Vec<f32>> {
         self.ask("extinction_at_points", at, params, time, interrupt)
     }
 
@@ -303,7 +313,8 @@ impl Renderer {
              if id.x >= arrayLength(&points) {{ return; }}\nlet x = points[id.x];\n\
              results[id.x] = vec4f({expression});\n}}\n"
         );
-        let linked = Linked::from_source(&source).map_err(|error| Error::parameter("imports", error, "shader names"))?;
+        let linked =
+            Linked::from_source(&source).map_err(|error| Error::parameter("imports", error, "shader names"))?;
         let kernel = Kernel::from_linked(&self.gpu, &linked, "probe")?;
         let camera = Camera::equirect(DVec3::ZERO)?;
         self.run_points(&kernel, &camera, inputs, params, time, interrupt)

@@ -90,9 +90,9 @@ impl Camera {
     /// target : (3,) floats
     ///     A point in the middle of the picture.
     /// up : (3,) floats
-    ///     A direction that is up in the picture.
+    ///     A direction that is up in the picture; (0, 0, 1) if left out.
     /// fov_y : float
-    ///     Vertical field of view in degrees, above 0 and at most 179.
+    ///     Vertical field of view in degrees, above 0 and at most 179; 60 if left out.
     #[staticmethod]
     #[pyo3(signature = (eye, target, up=None, fov_y=None))]
     fn look_at(
@@ -114,7 +114,7 @@ impl Camera {
     /// world_from_camera : (4, 4) floats
     ///     Takes camera coordinates to world metres; a rigid motion.
     /// fov_y : float
-    ///     Vertical field of view in degrees, above 0 and at most 179.
+    ///     Vertical field of view in degrees, above 0 and at most 179; 60 if left out.
     /// convention : {"opengl", "opencv"}
     ///     The camera's axes: +x right, +y up, looking down -z; or +x right, +y down, looking down +z.
     #[staticmethod]
@@ -151,8 +151,9 @@ impl Camera {
 
     /// An equidistant all-sky camera.
     ///
-    /// The image's centre is `up`, its top as far north as can be; as on a photograph of the sky, east is on the left.
-    /// `fov` degrees span the shorter side; outside that circle pixels are 0 with alpha 0.
+    /// The image's centre is `up` (the zenith if left out), its top as far north as can be; as on a photograph of the
+    /// sky, east is on the left. `fov` degrees (180 if left out) span the shorter side; outside that circle pixels are 0
+    /// with alpha 0.
     #[staticmethod]
     #[pyo3(signature = (eye, up=None, fov=None))]
     fn fisheye(
@@ -166,6 +167,7 @@ impl Camera {
         raise(py, CoreCamera::fisheye(vector_from_python("eye", eye)?, up, fov)).map(Self)
     }
 
+    /// The projection: "perspective", "equirect" or "fisheye".
     #[getter]
     fn kind(&self) -> &'static str {
         match self.0.projection {
@@ -175,26 +177,31 @@ impl Camera {
         }
     }
 
+    /// Position in world metres.
     #[getter]
     fn eye(&self) -> (f64, f64, f64) {
         self.0.eye.into()
     }
 
+    /// Unit vector toward the middle of the picture.
     #[getter]
     fn forward(&self) -> (f64, f64, f64) {
         self.0.forward.into()
     }
 
+    /// Unit vector toward the top of the picture.
     #[getter]
     fn up(&self) -> (f64, f64, f64) {
         self.0.up.into()
     }
 
+    /// Unit vector toward the right of the picture.
     #[getter]
     fn right(&self) -> (f64, f64, f64) {
         self.0.right.into()
     }
 
+    /// Field of view in degrees: vertical, of a fisheye its whole circle.
     #[getter]
     fn fov(&self) -> f64 {
         self.0.fov
@@ -286,7 +293,13 @@ impl Renderer {
 #[pymethods]
 impl Renderer {
     #[new]
-    fn new(py: Python<'_>, width: u32, height: u32, quality: &Bound<'_, PyAny>, adapter: Option<String>) -> PyResult<Self> {
+    fn new(
+        py: Python<'_>,
+        width: u32,
+        height: u32,
+        quality: &Bound<'_, PyAny>,
+        adapter: Option<String>,
+    ) -> PyResult<Self> {
         let quality: Quality = quality_from_python(quality)?;
         let core = detached(py, move |_| CoreRenderer::new(width, height, quality, adapter.as_deref()))?;
         Ok(Self { core: Mutex::new(core), width, height })
@@ -301,9 +314,8 @@ impl Renderer {
         background: bool,
     ) -> PyResult<Bound<'py, PyAny>> {
         let params: Params = params_from_python(params)?;
-        let picture = detached(py, |interrupt| {
-            lock(&self.core).render(&camera.0, &params, time, background, false, interrupt)
-        })?;
+        let picture =
+            detached(py, |interrupt| lock(&self.core).render(&camera.0, &params, time, background, false, interrupt))?;
         array(py, picture.image, &self.shape(&[4]))
     }
 
@@ -378,9 +390,8 @@ impl Renderer {
         time: f64,
     ) -> PyResult<Bound<'py, PyAny>> {
         let params: Params = params_from_python(params)?;
-        let answers = detached(py, |interrupt| {
-            lock(&self.core).probe(&imports, expression, &inputs, &params, time, interrupt)
-        })?;
+        let answers =
+            detached(py, |interrupt| lock(&self.core).probe(&imports, expression, &inputs, &params, time, interrupt))?;
         let count = answers.len();
         array(py, answers.into_flattened(), &[count, 4])
     }

@@ -48,9 +48,9 @@ struct Steps {
 fn ray_steps(start: f32, length: f32, direction: vec3f) -> Steps {
     let slant = 1.0 - abs(dot(direction, frame.zenith));
     let count = mix(f32(quality.steps_zenith), f32(quality.steps_horizon), slant);
-    // At full growth a step is a fixed share of its distance plus 1 km: rays that start in the cloud have fine steps
-    // near the eye, rays that start far away have nearly equal ones.
-    var growth = quality.step_growth / (start + 1000.0);
+    // At full growth a step is a fixed share of its distance plus 300 m: rays that start in the cloud have fine steps
+    // near the eye (10 m, where 1 km would give 25 and show them as grain), rays that start far away nearly equal ones.
+    var growth = quality.step_growth / (start + 300.0);
     growth = select(growth, 0.0, growth * length < 1e-3);
     return Steps(u32(round(count)), length, growth, log2(1.0 + growth * length) / round(count));
 }
@@ -103,47 +103,37 @@ fn march_ray(direction: vec3f, offset: f32) -> Cloud {
     let big = quality.big_step;
     var i = 0u; // the step at hand
     var seen = 0u; // steps below this one have had their full sample
-    // Loops in loops, and no branch with much behind it: lavapipe runs both sides of every branch, and skips only
-    // loops that none of its eight rays is in. On a GPU, too, rays then wait for each other before the dear parts and
-    // do them together. Every round ends with a step that no later round takes again, so they are counted.
-    for (var round = 0u; round < steps.count; round++) {
-        // Outside: big steps, and the weather alone until it allows for cloud, then the shape.
-        while i < steps.count {
-            var at: Sample;
-            var column: Column;
-            while i < steps.count {
-                at = march_sample(stretches, steps, direction, offset, i, pixel_size);
-                column = cloud_column(at.p, at.altitude);
-                if column.limit > 0.0 {
-                    break;
-                }
-                i += big;
-            }
-            if i >= steps.count || cloud_shape(column, at.altitude, at.width) > 0.0 {
-                break;
-            }
-            i += big;
-        }
-        if i >= steps.count {
-            break;
-        }
-        // Back by the steps that were leapt over.
-        i = max(i - min(i, big - 1u), seen);
-
-        // Inside: full samples of every step, until too many in a row are empty.
-        var empty = 0u;
-        while i < steps.count && empty < quality.empty_samples && transmittance >= quality.min_transmittance {
-            var at: Sample;
-            var column: Column;
-            var density = 0.0;
-            while i < steps.count && empty < quality.empty_samples && density <= 0.0 {
-                at = march_sample(stretches, steps, direction, offset, i, pixel_size);
-                column = cloud_column(at.p, at.altitude);
-                let shape = cloud_shape(column, at.altitude, at.width);
-                density = cloud_density(column, shape, at.altitude, at.width);
-                i += 1u;
+    var empty = quality.empty_samples; // full samples of zero in a row; from that many on, samples are cheap
+    // A loop in a loop, and no branch with much behind it: lavapipe runs both sides of every branch, and skips only loops
+    // that none of its eight rays is in. Each ray of a group goes on to its next cloud, and all take the dear part, the
+    // light, together; a GPU's rays do likewise. Measured: 2.6 times as fast as one loop of branches.
+    while i < steps.count {
+        var at: Sample;
+        var column: Column;
+        var shape = 0.0;
+        // On to the next cloud: big steps with cheap samples outside, back by what was leapt over on a hit.
+        while i < steps.count && shape <= 0.0 {
+            at = march_sample(stretches, steps, direction, offset, i, pixel_size);
+            column = cloud_column(at.p, at.altitude);
+            shape = cloud_shape(column, at.altitude, at.width);
+            let searching = empty >= quality.empty_samples;
+            if shape <= 0.0 {
                 empty += 1u;
+                i += select(1u, big, searching);
+                seen = select(i, seen, searching);
+            } else if searching {
+                empty = 0u;
+                let back = max(i - min(i, big - 1u), seen);
+                shape = select(0.0, shape, back == i);
+                i = back;
             }
+        }
+        // Not "shape > 0": with that, a NaN would stand still for ever.
+        if i < steps.count && !(shape <= 0.0) {
+            i += 1u;
+            seen = i;
+            empty += 1u;
+            let density = cloud_density(column, shape, at.altitude, at.width);
             if density > 0.0 {
                 empty = 0u;
                 let x = density * params.clouds.extinction * at.length;
@@ -159,11 +149,10 @@ fn march_ray(direction: vec3f, offset: f32) -> Cloud {
                 weight_sum += weight;
                 distance_sum += weight * at.t;
                 transmittance *= exp(-x);
+                if transmittance < quality.min_transmittance {
+                    i = steps.count;
+                }
             }
-        }
-        seen = i;
-        if transmittance < quality.min_transmittance {
-            break;
         }
     }
     if weight_sum <= 0.0 {

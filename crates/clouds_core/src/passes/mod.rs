@@ -59,11 +59,7 @@ impl Uniforms {
     }
 
     pub fn bindings(&self) -> Bindings<'_> {
-        vec![
-            ("params", (&self.params).into()),
-            ("frame", (&self.frame).into()),
-            ("quality", (&self.quality).into()),
-        ]
+        vec![("params", (&self.params).into()), ("frame", (&self.frame).into()), ("quality", (&self.quality).into())]
     }
 }
 

@@ -1,0 +1,76 @@
+# Every command of the project; `make` alone lists them. Each does its own set-up.
+
+SHELL := bash
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+
+# Where rustup puts Rust, for shells that have not read its profile.
+export PATH := $(PATH):$(HOME)/.cargo/bin
+# maturin installs here, whatever environment is active.
+export VIRTUAL_ENV := $(CURDIR)/$(VENV)
+unexport CONDA_PREFIX
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+
+.PHONY: help setup build generate render test types lint bench clean
+
+help: ## List the commands
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+# Asks apt for nothing when all is there.
+setup: ## Install what is missing (Debian, Ubuntu): software Vulkan driver, C linker, venv
+	@command -v cargo > /dev/null || { echo 'Rust is missing: get it from https://rustup.rs' >&2; exit 1; }
+	@$(PYTHON) -c 'import sys; v = sys.version_info; v >= (3, 11) or sys.exit("Python 3.11 or later is needed, but \
+	$(PYTHON) is %d.%d; another is chosen by: make PYTHON=python3.11" % v[:2])'
+	@missing=(); \
+	$(PYTHON) -c 'import ensurepip, venv' 2> /dev/null || missing+=(python3-venv); \
+	command -v cc > /dev/null || missing+=(gcc libc6-dev); \
+	if [[ $$(uname) == Linux ]]; then \
+	    compgen -G '/usr/share/vulkan/icd.d/lvp_icd*.json' > /dev/null || missing+=(mesa-vulkan-drivers); \
+	    /sbin/ldconfig -p 2> /dev/null | grep -q 'libvulkan\.so\.1 ' || missing+=(libvulkan1); \
+	fi; \
+	if [[ $${#missing[@]} == 0 ]]; then \
+	    exit; \
+	elif ! command -v apt-get > /dev/null; then \
+	    echo "Missing, by the names of Debian's packages: $${missing[*]}" >&2; exit; \
+	fi; \
+	echo "Installing $${missing[*]}"; \
+	run=(env DEBIAN_FRONTEND=noninteractive); [[ $$EUID == 0 ]] || run=(sudo "$${run[@]}"); \
+	"$${run[@]}" apt-get update -qq && \
+	"$${run[@]}" apt-get install -qq --no-install-recommends "$${missing[@]}" > /dev/null
+
+generate: setup ## Write what is made from the Rust parameters: python/nubis/params.py, docs/parameters.md
+	cargo run --release --example generate
+
+# Made again when the dependencies may have changed.
+$(VENV)/ready: pyproject.toml | generate
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet 'maturin>=1.9,<2'
+	PIP_QUIET=1 $(BIN)/maturin develop --release --extras dev
+	@touch $@
+
+build: generate $(VENV)/ready ## Make .venv with nubis in it
+	$(BIN)/maturin develop --release --skip-install
+
+render: build ## Render every scene into out/
+	$(BIN)/python -m nubis render --all --out out
+
+test: types ## Run all tests; needs no GPU
+	cargo test --release
+	$(BIN)/python -m pytest
+
+types: build ## Check the types of the package, of its compiled module and of the examples
+	$(BIN)/python -m mypy.stubtest nubis._nubis
+	$(BIN)/mypy
+
+lint: types ## Check format, style and types
+	cargo fmt --check
+	cargo clippy --release --workspace --all-targets --quiet -- -D warnings
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+
+bench: setup ## Time a small frame and each of its kernels (NUBIS_ADAPTER chooses the adapter)
+	cargo bench --bench frame
+
+clean: ## Remove everything that was made
+	rm -rf target $(VENV) out python/nubis/*.so

@@ -1,0 +1,200 @@
+"""The command line: ``python -m nubis --help``."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import warnings
+from collections.abc import Iterable, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+
+import nubis
+
+_FORMATS = ("png", "exr", "hdr", "npy")
+
+_EXAMPLES = """\
+examples:
+  python -m nubis render sunset
+  python -m nubis render --all --size 320x180 --quality draft
+  python -m nubis render storm --out storm.exr --time 60 --adapter cpu
+  python -m nubis render fair_weather --params my_sky.toml --exposure 0.5
+"""
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m nubis",
+        description="Volumetric clouds on any Vulkan device or none.",
+        epilog=_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"nubis {nubis.__version__}")
+    commands = parser.add_subparsers(required=True, metavar="command")
+
+    render = commands.add_parser(
+        "render",
+        help="render scenes into files",
+        description="Render scenes into files.",
+        epilog=_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    render.set_defaults(run=_render)
+    render.add_argument("scenes", nargs="*", metavar="SCENE", help="see `python -m nubis scenes`")
+    render.add_argument("--all", action="store_true", help="render every scene")
+    render.add_argument(
+        "--out",
+        type=Path,
+        default=Path("out"),
+        metavar="DIR|FILE",
+        help="folder, or file of one scene ending in .png .exr .hdr or .npy (default: out)",
+    )
+    render.add_argument(
+        "--format",
+        choices=_FORMATS,
+        default="png",
+        help="of files in a folder: png is tone-mapped, the others are linear (default: png)",
+    )
+    render.add_argument(
+        "--size", type=_size, default=(960, 540), metavar="WxH", help="pixels (default: 960x540)"
+    )
+    render.add_argument(
+        "--quality",
+        default="balanced",
+        metavar="NAME",
+        help="numerical method, such as draft, balanced or high (default: balanced)",
+    )
+    render.add_argument(
+        "--adapter",
+        metavar="X",
+        help="index, kind or part of a name (default: NUBIS_ADAPTER, else the best)",
+    )
+    render.add_argument(
+        "--time", type=float, default=0.0, metavar="S", help="seconds of wind (default: 0)"
+    )
+    render.add_argument(
+        "--exposure", type=float, default=0.0, metavar="E", help="stops, for png (default: 0)"
+    )
+    render.add_argument(
+        "--params", type=Path, metavar="FILE", help="TOML file of a sky in place of the scenes' own"
+    )
+
+    for run, name, about in [
+        (_scenes, "scenes", "list the scenes"),
+        (_adapters, "adapters", "list the adapters, best first"),
+        (_info, "info", "print versions and adapters, and try a small render"),
+    ]:
+        command = commands.add_parser(name, help=about, description=about.capitalize() + ".")
+        command.set_defaults(run=run)
+    return parser
+
+
+def _size(text: str) -> tuple[int, int]:
+    width, _, height = text.partition("x")
+    if not (width.isdecimal() and height.isdecimal()):
+        raise argparse.ArgumentTypeError(f"{text!r} is no size such as 960x540")
+    return int(width), int(height)
+
+
+def _render(args: argparse.Namespace) -> None:
+    targets = _targets(args)
+    sky = nubis.Params.load(args.params) if args.params else None
+    renderer = nubis.Renderer(*args.size, quality=args.quality, adapter=args.adapter)
+    print(_line(renderer.adapter), flush=True)
+    width, height = renderer.size
+    with _progress(targets) as bar:
+        say = getattr(bar, "write", print)
+        for name, path in bar:
+            camera, params = nubis.scenes[name]
+            started = perf_counter()
+            frame = renderer.render(camera, sky or params, time=args.time)
+            milliseconds = 1000 * (perf_counter() - started)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            nubis.save(path, frame, exposure=args.exposure)
+            say(f"{path}: {renderer.adapter.name}, {width}x{height}, {milliseconds:.0f} ms")
+            sys.stdout.flush()
+
+
+def _targets(args: argparse.Namespace) -> list[tuple[str, Path]]:
+    """Which scenes go into which files."""
+    names: list[str] = list(nubis.scenes) if args.all else args.scenes
+    known = ", ".join(nubis.scenes)
+    if not names:
+        raise nubis.ParameterError(f"no scene is given: name some of {known}, or use --all")
+    for name in names:
+        if name not in nubis.scenes:
+            raise nubis.ParameterError(
+                f"SCENE = {name!r} is not allowed: it must be one of {known}"
+            )
+    out: Path = args.out
+    if out.suffix.lstrip(".").lower() not in _FORMATS:
+        return [(name, out / f"{name}.{args.format}") for name in names]
+    if len(names) > 1:
+        raise nubis.ParameterError(
+            f"--out = {str(out)!r} is not allowed: it must be a folder for more than one scene"
+        )
+    return [(names[0], out)]
+
+
+def _progress(
+    targets: list[tuple[str, Path]],
+) -> AbstractContextManager[Iterable[tuple[str, Path]]]:
+    """The targets, behind a progress bar where there are tqdm and a terminal."""
+    try:
+        from tqdm import tqdm
+    except ImportError:
+        return nullcontext(targets)
+    return tqdm(targets, unit="scene", leave=False, disable=None)
+
+
+def _line(adapter: nubis.Adapter) -> str:
+    return f"{adapter.name} ({adapter.kind}, {adapter.backend}, {adapter.driver})"
+
+
+def _scenes(_: argparse.Namespace) -> None:
+    print("\n".join(nubis.scenes))
+
+
+def _adapters(_: argparse.Namespace) -> None:
+    found = nubis.adapters()
+    if not found:
+        nubis.Renderer(1, 1)  # Raises the error that says what would help.
+    for index, adapter in enumerate(found):
+        print(f"{index}: {_line(adapter)}")
+
+
+def _info(args: argparse.Namespace) -> None:
+    python = ".".join(map(str, sys.version_info[:3]))
+    print(f"nubis {nubis.__version__}, NumPy {np.__version__}, Python {python} on {sys.platform}")
+    _adapters(args)
+    renderer = nubis.Renderer(16, 16, quality="draft")
+    started = perf_counter()
+    frame = renderer.render(*nubis.scenes["fair_weather"])
+    if not (np.isfinite(frame).all() and frame[..., :3].max() > 0):
+        raise nubis.DeviceError(f"{renderer.adapter.name} rendered a picture that is no sky")
+    print(f"test render on {renderer.adapter.name}: ok, {perf_counter() - started:.1f} s")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command; return 0, 2 after a mistake, 1 after a surprise, 130 after Ctrl-C."""
+    args = _parser().parse_args(arguments)
+    try:
+        with warnings.catch_warnings():
+            # The line with the adapter says so too.
+            warnings.filterwarnings("ignore", "no hardware Vulkan adapter")
+            args.run(args)
+    except KeyboardInterrupt:
+        return 130
+    except Exception as error:
+        mistake = isinstance(error, nubis.NubisError | OSError)
+        kind = "" if mistake else f"{type(error).__name__}: "
+        print("nubis:", kind + " ".join(str(error).split()), file=sys.stderr)
+        return 2 if mistake else 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,175 @@
+"""The compiled renderer: crates/clouds_py/src/lib.rs."""
+
+from os import PathLike
+from typing import Any, Literal, Self, TypeAlias, final
+
+import numpy as np
+import numpy.typing as npt
+
+from nubis.params import Params, Quality
+
+__all__ = [
+    "Camera",
+    "Renderer",
+    "adapters",
+    "check",
+    "check_params",
+    "check_quality",
+    "quality",
+    "to_srgb8",
+    "write_exr",
+    "write_hdr",
+    "write_png",
+]
+
+_Vector: TypeAlias = tuple[float, float, float]
+_CameraState: TypeAlias = tuple[int, _Vector, _Vector, _Vector, _Vector, float]
+
+@final
+class Camera:
+    """A camera: see `Camera.look_at`, `from_matrix`, `equirect` and `fisheye`."""
+
+    @staticmethod
+    def look_at(
+        eye: npt.ArrayLike,
+        target: npt.ArrayLike,
+        up: npt.ArrayLike | None = None,
+        fov_y: float | None = None,
+    ) -> Camera:
+        """A pinhole camera.
+
+        Parameters
+        ----------
+        eye : (3,) floats
+            Position in world metres (x east, y north, z up).
+        target : (3,) floats
+            A point in the middle of the picture.
+        up : (3,) floats
+            A direction that is up in the picture; (0, 0, 1) if left out.
+        fov_y : float
+            Vertical field of view in degrees, above 0 and at most 179; 60 if left out.
+        """
+
+    @staticmethod
+    def from_matrix(
+        world_from_camera: npt.ArrayLike,
+        fov_y: float | None = None,
+        convention: Literal["opengl", "opencv"] = "opengl",
+    ) -> Camera:
+        """A pinhole camera from a matrix.
+
+        Parameters
+        ----------
+        world_from_camera : (4, 4) floats
+            Takes camera coordinates to world metres; a rigid motion.
+        fov_y : float
+            Vertical field of view in degrees, above 0 and at most 179; 60 if left out.
+        convention : {"opengl", "opencv"}
+            The camera's axes: +x right, +y up, looking down -z; or +x right, +y down, looking down
+            +z.
+        """
+
+    @staticmethod
+    def equirect(eye: npt.ArrayLike) -> Camera:
+        """The whole sphere around `eye` by longitude and latitude.
+
+        The image's centre is north, right is clockwise seen from above (east), its top row the
+        zenith. Twice as wide as high gives square pixels.
+        """
+
+    @staticmethod
+    def fisheye(
+        eye: npt.ArrayLike, up: npt.ArrayLike | None = None, fov: float | None = None
+    ) -> Camera:
+        """An equidistant all-sky camera.
+
+        The image's centre is `up` (the zenith if left out), its top as far north as can be; as on a
+        photograph of the sky, east is on the left. `fov` degrees (180 if left out) span the shorter
+        side; outside that circle pixels are 0 with alpha 0.
+        """
+
+    @property
+    def kind(self) -> Literal["perspective", "equirect", "fisheye"]:
+        """The projection: "perspective", "equirect" or "fisheye"."""
+
+    @property
+    def eye(self) -> _Vector:
+        """Position in world metres."""
+
+    @property
+    def forward(self) -> _Vector:
+        """Unit vector toward the middle of the picture."""
+
+    @property
+    def up(self) -> _Vector:
+        """Unit vector toward the top of the picture."""
+
+    @property
+    def right(self) -> _Vector:
+        """Unit vector toward the right of the picture."""
+
+    @property
+    def fov(self) -> float:
+        """Field of view in degrees: vertical, of a fisheye its whole circle."""
+
+    def matrix(self) -> list[list[float]]:
+        """The 4 x 4 matrix from camera coordinates (OpenGL) to world coordinates, by rows."""
+
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    def __reduce__(self) -> tuple[Any, tuple[_CameraState]]: ...
+    @staticmethod
+    def _restore(state: _CameraState) -> Camera: ...
+
+@final
+class Renderer:
+    """What `nubis.Renderer` wraps: no defaults, plain values."""
+
+    def __new__(cls, width: int, height: int, quality: Quality, adapter: str | None) -> Self: ...
+    def render(
+        self, camera: Camera, params: Params, time: float, background: bool
+    ) -> npt.NDArray[np.float32]: ...
+    def render_layers(
+        self, camera: Camera, params: Params, time: float
+    ) -> tuple[
+        npt.NDArray[np.float32],
+        npt.NDArray[np.float32],
+        npt.NDArray[np.float32],
+        npt.NDArray[np.uint32],
+    ]:
+        """Clouds with alpha, sky, depth (-1 where there is none), density evaluations."""
+
+    def animate(
+        self, camera: Camera, params: Params, time: float, background: bool
+    ) -> npt.NDArray[np.float32]: ...
+    def cut(self) -> None: ...
+    def density(
+        self, points: npt.ArrayLike, params: Params, time: float
+    ) -> npt.NDArray[np.float32]: ...
+    def sun_transmittance(
+        self, points: npt.ArrayLike, params: Params, time: float
+    ) -> npt.NDArray[np.float32]: ...
+    def probe(
+        self,
+        imports: list[str],
+        expression: str,
+        inputs: list[list[float]],
+        params: Params,
+        time: float,
+    ) -> npt.NDArray[np.float32]: ...
+    def timings(self) -> list[tuple[str, float]]: ...
+    def adapter(self) -> dict[str, str]: ...
+
+def adapters() -> list[dict[str, str]]: ...
+def check(type_name: str, path: str, name: str, value: object) -> Any:
+    """The value in the type that a field of a block holds, or `ParameterError`."""
+
+def check_params(params: object) -> None: ...
+def check_quality(quality: Quality) -> None: ...
+def quality(name: str) -> dict[str, Any]: ...
+def to_srgb8(
+    frame: npt.NDArray[np.float32], exposure: float, tonemap: str
+) -> npt.NDArray[np.uint8]: ...
+def write_png(path: str | PathLike[str], frame: npt.NDArray[np.uint8]) -> None: ...
+def write_exr(path: str | PathLike[str], frame: npt.NDArray[np.float32]) -> None: ...
+def write_hdr(path: str | PathLike[str], frame: npt.NDArray[np.float32]) -> None: ...

@@ -1,0 +1,41 @@
+"""One adapter for all tests, named in the header, and renderers that are made once and shared."""
+
+import functools
+import os
+
+import numpy as np
+import pytest
+
+os.environ.setdefault("NUBIS_ADAPTER", "cpu")
+
+import nubis  # noqa: E402 (the adapter is chosen first)
+import nubis.testing  # noqa: E402
+
+# Probes share a renderer: what it bakes takes longer than they do.
+nubis.testing.Renderer = functools.cache(nubis.Renderer)
+
+
+def pytest_report_header():
+    adapter = nubis.Renderer(1, 1).adapter
+    return f"nubis {nubis.__version__} on {adapter.name} ({adapter.kind}), {adapter.driver}, {adapter.backend}"
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _vulkan():
+    assert nubis.Renderer(1, 1).adapter.backend == "vulkan"
+
+
+@pytest.fixture(scope="session")
+def renderer():
+    """``renderer(width, height, quality)``: the same object for the same arguments."""
+
+    @functools.cache
+    def make(width=64, height=36, quality="draft"):
+        return nubis.Renderer(width, height, quality=quality)
+
+    return make
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(20150809)

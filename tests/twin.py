@@ -84,23 +84,36 @@ def transmittance(renderer, params, eye, directions, n, time=0.0):
     return np.exp(-optical_depths(renderer, params, starts, directions, ends, n, time)[0].sum(axis=1))
 
 
-def sun_transmittance(renderer, params, points, n):
+def cloudy_time(renderer, params, camera, low, high):
+    """A time at which the mean transmittance of a narrow view lies between `low` and `high`.
+
+    The wind brings cloud before every camera sooner or later, whatever the noises and profiles are tuned to.
+    """
+    directions = pixel_directions(camera, 4, 3).reshape(-1, 3)
+    for time in range(0, 20_000, 500):
+        if low < transmittance(renderer, params, camera.eye, directions, 500, time).mean() < high:
+            return float(time)
+    raise AssertionError("no cloud passes")
+
+
+def sun_transmittance(renderer, params, points, n, time=0.0):
     """0 where the ground hides the sun."""
     sun, radius = sun_direction(params), params.atmosphere.planet_radius
     # To the last way out of the shell; without one in front, there is nothing between the point and the sun.
     ends = np.nan_to_num(sphere_hits(points, sun, radius, params.clouds.top)[1]).clip(0)
-    depth = optical_depths(renderer, params, points, np.broadcast_to(sun, points.shape), ends, n)[0]
+    depth = optical_depths(renderer, params, points, np.broadcast_to(sun, points.shape), ends, n, time)[0]
     hidden = sphere_hits(points, sun, radius, 0.0)[0] > 0
     return np.where(hidden, 0, np.exp(-depth.sum(axis=1)))
 
 
-def single_scattering(renderer, params, eye, directions, n, n_sun):
+def single_scattering(renderer, params, eye, directions, n, n_sun, time=0.0):
     """The contract's integral of sigma_s p E T_sun T dt, without air, as radiance (N, 3)."""
     starts = np.broadcast_to(np.asarray(eye, dtype=np.float64), directions.shape)
-    depth, points = optical_depths(renderer, params, starts, directions, ray_ends(eye, directions, params), n)
+    ends = ray_ends(eye, directions, params)
+    depth, points = optical_depths(renderer, params, starts, directions, ends, n, time)
     lit = depth > 0
     sun = np.zeros(depth.shape)
-    sun[lit] = sun_transmittance(renderer, params, points[lit], n_sun)
+    sun[lit] = sun_transmittance(renderer, params, points[lit], n_sun, time)
     seen = np.exp(depth - np.cumsum(depth, axis=1))
     phase = henyey_greenstein(directions @ sun_direction(params), params.light.g)
     scattered = params.light.albedo * phase * (seen * -np.expm1(-depth) * sun).sum(axis=1)
@@ -140,6 +153,8 @@ def smooth_params(**changes):
         "clouds.detail_scale": 20_000.0,
         "clouds.curl_scale": 40_000.0,
         "high_clouds.coverage": 0.0,
+        "wind.speed": 10.0,
+        "wind.detail_speed": 10.0,
         "atmosphere.enabled": False,
         "sun.visible": False,
     }

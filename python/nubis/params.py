@@ -188,7 +188,7 @@ class HighClouds(Block):
         Width and height of the texture. Allowed: a whole number from 16 to 4096 texels.
     """
 
-    coverage: float = 0.35
+    coverage: float = 0.5
     altitude: float = 8500.0
     optical_depth: float = 0.5
     scale: float = 42000.0

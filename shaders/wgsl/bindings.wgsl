@@ -31,8 +31,8 @@
 @group(0) @binding(18) var<storage, read_write> fresh_depth: array<f32>;
 @group(0) @binding(19) var<storage, read_write> history: array<vec4f>;
 @group(0) @binding(20) var<storage, read_write> history_depth: array<f32>;
-@group(0) @binding(21) var<storage, read_write> history_count: array<u32>;
-@group(0) @binding(22) var<storage, read_write> count: array<u32>;
+@group(0) @binding(21) var<storage, read_write> history_known: array<u32>; // 1 where marched since the cut, 0 where guessed
+@group(0) @binding(22) var<storage, read_write> known: array<u32>;
 
 // Outputs of the bakes.
 @group(0) @binding(23) var volume_in: texture_3d<f32>;

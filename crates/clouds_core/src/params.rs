@@ -111,7 +111,7 @@ params! {
     /// The thin high clouds, a layer without thickness on its own sphere (nubis2015; animated as in gems2001).
     HighClouds {
         /// How much of the sky they cover.
-        coverage: f32 = 0.35, in 0..=1 "";
+        coverage: f32 = 0.5, in 0..=1 "";
         /// Altitude of the layer.
         altitude: f32 = 8500.0, in 100..=30000 "m";
         /// Optical depth, seen from straight below, where they are thickest.

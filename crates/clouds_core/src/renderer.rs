@@ -203,8 +203,10 @@ impl Renderer {
             frame.set_previous(&last.frame, camera.eye - last.camera.eye, params, time - last.time);
             frame.moving = u32::from(last.camera != *camera || last.params != *params || last.time != time);
         }
-        // Each round of the sixteen pixels moves the blue noise on by the golden ratio.
-        frame.jitter_shift = (f64::from(index / 16) * 0.618_033_988_749_895).fract() as f32;
+        // While anything moves, each round of the sixteen pixels moves the blue noise on by the golden ratio; a static
+        // shot keeps the still's, and so becomes the still.
+        let round = if frame.moving > 0 { index / 16 } else { 0 };
+        frame.jitter_shift = (f64::from(round) * 0.618_033_988_749_895).fract() as f32;
         let bound = world.run(gpu, params, &frame, quality, timings, interrupt)?;
 
         if last.is_none() {
@@ -213,7 +215,7 @@ impl Renderer {
                 march::run(gpu, &mut work, &bound.all, frame, &animation.now.marched)?;
                 work.submit(timings, interrupt).map(drop)
             })?;
-            gpu.queue.write_buffer(&animation.now.count, 0, bytemuck::cast_slice(&vec![1u32; pixels as usize]));
+            gpu.queue.write_buffer(&animation.now.known, 0, bytemuck::cast_slice(&vec![1u32; pixels as usize]));
         } else {
             frame.stride = STRIDE;
             [frame.subpixel_x, frame.subpixel_y] = ORDER[index as usize % 16];

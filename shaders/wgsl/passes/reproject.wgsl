@@ -3,9 +3,9 @@
 #import camera
 #import shell
 
-// A pixel's history counts for this many marched samples at most: after that old samples fade.
-const MAX_COUNT_STILL = 64u;
-const MAX_COUNT_MOVING = 3u;
+// How many standard deviations of its neighbourhood a moving pixel may be from its mean. Measured on a pan: 1.25 blurs
+// (error 13.0 %), 2 keeps what 4 keeps (11.7 and 11.4 %) and still catches ghosts.
+const SPREAD = 2.0;
 
 @compute @workgroup_size(8, 8)
 fn reproject(@builtin(global_invocation_id) id: vec3u) {
@@ -45,10 +45,10 @@ fn reproject(@builtin(global_invocation_id) id: vec3u) {
     let own = fresh[fresh_index(cell)];
     let own_depth = fresh_depth[fresh_index(cell)];
 
-    // Without history: what was marched here, or the smooth guess.
+    // Marched just now, or, without history, the smooth guess.
     var value = select(guess, own, is_fresh);
     var value_depth = select(distance, own_depth, is_fresh);
-    var value_count = select(0u, 1u, is_fresh);
+    var value_known = is_fresh;
 
     // Where the cloud seen here was in the frame before. Where no cloud is near, the sky stands still.
     let view = view_direction(vec2f(pixel) + 0.5);
@@ -58,23 +58,15 @@ fn reproject(@builtin(global_invocation_id) id: vec3u) {
     if was.z > 0.0 {
         let old = history_at(was.xy);
         let old_index = nearest_index(was.xy);
-        let old_count = history_count[old_index];
-        if old_count > 0u && is_finite4(old) {
+        if history_known[old_index] > 0u && is_finite4(old) && !is_fresh {
             var kept = old;
             if frame.moving > 0u {
                 let deviation = sqrt(max(square - mean * mean, vec4f(0.0)));
-                kept = clamp(old, mean - 1.25 * deviation, mean + 1.25 * deviation);
+                kept = clamp(old, mean - SPREAD * deviation, mean + SPREAD * deviation);
             }
-            let limit = select(MAX_COUNT_STILL, MAX_COUNT_MOVING, frame.moving > 0u);
-            value_count = min(old_count, limit);
-            if is_fresh {
-                value_count += 1u;
-                value = mix(kept, own, 1.0 / f32(value_count));
-            } else {
-                value = kept;
-                let old_depth = history_depth[old_index];
-                value_depth = select(distance, old_depth, frame.moving == 0u);
-            }
+            value = kept;
+            value_known = true;
+            value_depth = select(distance, history_depth[old_index], frame.moving == 0u);
         }
     }
     if !is_finite4(value) {
@@ -82,7 +74,7 @@ fn reproject(@builtin(global_invocation_id) id: vec3u) {
     }
     clouds[index] = vec4f(max(value.rgb, vec3f(0.0)), saturate(value.a));
     cloud_depth[index] = select(max(value_depth, 0.0), -1.0, value.a >= 1.0);
-    count[index] = value_count;
+    known[index] = select(0u, 1u, value_known);
 }
 
 fn fresh_index(cell: vec2i) -> u32 {
@@ -100,15 +92,31 @@ fn nearest_index(at: vec2f) -> u32 {
     return pixel_index(vec2i(floor(at)));
 }
 
-// The history between four pixel centres. A pixel that has not moved reads itself, exactly.
+// The history between pixel centres, by Catmull-Rom splines: linear interpolation, repeated every frame, would blur. A
+// pixel that has not moved reads itself, exactly.
 fn history_at(at: vec2f) -> vec4f {
     let p = at - 0.5;
     let snapped = select(p, round(p), abs(p - round(p)) < vec2f(1e-3));
     let corner = vec2i(floor(snapped));
     let f = snapped - floor(snapped);
-    let top = mix(history[pixel_index(corner)], history[pixel_index(corner + vec2i(1, 0))], f.x);
-    let bottom = mix(history[pixel_index(corner + vec2i(0, 1))], history[pixel_index(corner + vec2i(1, 1))], f.x);
-    return mix(top, bottom, f.y);
+    let x = catmull_rom(f.x);
+    let y = catmull_rom(f.y);
+    var sum = vec4f(0.0);
+    for (var j = 0; j < 4; j++) {
+        for (var i = 0; i < 4; i++) {
+            sum += x[i] * y[j] * history[pixel_index(corner + vec2i(i, j) - 1)];
+        }
+    }
+    return sum;
+}
+
+fn catmull_rom(f: f32) -> array<f32, 4> {
+    return array<f32, 4>(
+        f * (-0.5 + f * (1.0 - 0.5 * f)),
+        1.0 + f * f * (-2.5 + 1.5 * f),
+        f * (0.5 + f * (2.0 - 1.5 * f)),
+        f * f * (-0.5 + 0.5 * f),
+    );
 }
 
 // NaN would live in the history for ever, and lavapipe optimises x != x away: test the bits (hazard 11).

@@ -33,13 +33,13 @@ pub(crate) const ORDER: [[u32; 2]; 16] = [
 /// What is known of each pixel from the frames so far.
 pub(crate) struct History {
     pub marched: Marched,
-    /// Samples that a pixel's value is the mean of; 0 where it is a guess.
-    pub count: wgpu::Buffer,
+    /// 1 where a pixel has been marched since the cut, 0 where it is a guess.
+    pub known: wgpu::Buffer,
 }
 
 impl History {
     pub fn new(gpu: &Gpu, pixels: u64) -> Self {
-        Self { marched: Marched::new(gpu, pixels), count: gpu.buffer("count", 4 * pixels) }
+        Self { marched: Marched::new(gpu, pixels), known: gpu.buffer("known", 4 * pixels) }
     }
 }
 
@@ -58,8 +58,8 @@ pub(crate) fn run(
         ("fresh_depth", (&fresh.depth).into()),
         ("history", (&before.marched.clouds).into()),
         ("history_depth", (&before.marched.depth).into()),
-        ("history_count", (&before.count).into()),
-        ("count", (&out.count).into()),
+        ("history_known", (&before.known).into()),
+        ("known", (&out.known).into()),
     ];
     let bindings = [world.as_slice(), &out.marched.bindings(), &ours].concat();
     work.dispatch(&*gpu.kernel("reproject", "reproject")?, &bindings, [frame.width, frame.rows, 1])

@@ -1,0 +1,305 @@
+"""The march: transmittance against the integral of the renderer's own density, and what each layer of a picture means."""
+
+import numpy as np
+import pytest
+import twin
+
+import nubis
+
+EARTH = 6_371_000.0
+THESIS = 400_000.0
+
+
+def looking(height, elevation, fov_y=3.0):
+    eye = np.array([0.0, 0.0, height])
+    return nubis.Camera.look_at(eye, eye + twin.compass(15, elevation), fov_y=fov_y)
+
+
+# Narrow views, as the level of detail grows with a pixel's width. On thesis2018's planet of 400 km the horizon is near.
+VIEWS = {
+    "below": (looking(100, 34), EARTH, 0.004),
+    "zenith": (looking(100, 88), EARTH, 0.004),
+    "horizon": (looking(100, 2, 1), EARTH, 0.001),
+    "inside": (looking(1700, 2), EARTH, 0.002),
+    "inside, down": (looking(2500, -30), EARTH, 0.004),
+    "above": (looking(6000, -22), EARTH, 0.004),
+    "small planet": (looking(100, 2, 1), THESIS, 0.001),
+    # Tops dip by 12.0 degrees under this eye, bases by 13.3, the ground by 13.9.
+    "under the base and out again": (looking(12_000, -13.5, 0.5), THESIS, 0.0002),
+    "through the tops": (looking(12_000, -12.6, 0.5), THESIS, 0.0002),
+}
+
+
+def view_params(view, **changes):
+    camera, radius, extinction = VIEWS[view]
+    values = {"atmosphere.planet_radius": radius, "clouds.extinction": extinction}
+    return camera, twin.smooth_params(**(values | changes))
+
+
+@pytest.mark.parametrize("view", VIEWS)
+def test_transmittance(renderer, view):
+    """The integral in float64 starts at the eye and knows nothing of shells."""
+    camera, params = view_params(view)
+    directions = twin.pixel_directions(camera, 16, 9).reshape(-1, 3)
+    time = twin.cloudy_time(renderer(), params, camera, 0.05, 0.95)
+    got = renderer(16, 9, twin.fine(1024)).render_layers(camera, params, time=time)["transmittance"].ravel()
+    expected = twin.transmittance(renderer(), params, camera.eye, directions, 8000, time)
+    np.testing.assert_allclose(got, expected, atol=3e-4)
+
+
+@pytest.mark.parametrize("view", ["below", "inside", "above"])
+def test_more_steps_converge(renderer, view):
+    """Twice the steps, a third of the error or less: the rule is of second order."""
+    camera, params = view_params(view)
+    time = twin.cloudy_time(renderer(), params, camera, 0.05, 0.95)
+    counts = (32, 64, 128, 1024)
+    layers = {n: renderer(16, 9, twin.fine(n)).render_layers(camera, params, time=time) for n in counts}
+    expected = layers.pop(1024)["transmittance"]
+    error = [np.sqrt(np.mean((v["transmittance"] - expected) ** 2)) for v in layers.values()]
+    assert error[1] < error[0] / 3 and error[2] < error[1] / 3
+
+
+BOUNDS = {"draft": 0.06, "balanced": 0.03, "high": 0.01, "nubis2015": 0.06, "thesis2018": 0.06, "vsu2022": 0.03}
+
+
+@pytest.mark.parametrize("quality", BOUNDS)
+def test_methods_agree(renderer, quality):
+    """The method is no part of the look: every one is near a converged picture, the better ones nearer."""
+    camera, params = nubis.scenes["fair_weather"]
+    best = nubis.quality("high").replace(steps_zenith=1000, steps_horizon=2000, min_transmittance=1e-4)
+    got, expected = (renderer(48, 27, q).render_layers(camera, params)["transmittance"] for q in (quality, best))
+    assert np.sqrt(np.mean((got - expected) ** 2)) < BOUNDS[quality]
+    assert abs(np.mean(got - expected)) < 0.2 * BOUNDS[quality]
+
+
+def test_jitter_spreads_the_error_and_adds_none(renderer):
+    """Each ray of its own starts elsewhere; over the picture the mean stays."""
+    camera, params = view_params("below")
+    time = twin.cloudy_time(renderer(), params, camera, 0.05, 0.8)
+    straight, jittered, exact = (
+        renderer(64, 36, method).render_layers(camera, params, time=time)["transmittance"]
+        for method in (twin.fine(24), twin.fine(24, jitter=True), twin.fine(1024))
+    )
+    assert not np.array_equal(straight, jittered)
+    assert abs(np.mean(jittered - exact)) < 2e-3
+    # Blue noise: neighbours err to different sides.
+    error = jittered - exact
+    smooth = error.reshape(9, 4, 16, 4).mean(axis=(1, 3))
+    assert smooth.std() < 0.4 * error.std()
+
+
+def test_the_end_of_a_ray_is_not_lost(renderer):
+    """Ending at a transmittance of 0.1 scales away what is left: brightness stays within a few percent."""
+    camera, params = view_params("above", **{"clouds.extinction": 0.05, "light.model": "single"})
+    time = twin.cloudy_time(renderer(), params, camera, 0, 1e-3)
+    to_the_end, cut = (
+        renderer(16, 9, twin.fine(512, 16, min_transmittance=m)).render_layers(camera, params, time=time)
+        for m in (0.0, 0.1)
+    )
+    opaque = to_the_end["transmittance"] < 1e-3
+    assert (cut["transmittance"][opaque] == 0).all()
+    a, b = (v["radiance"][opaque].mean() for v in (to_the_end, cut))
+    assert b == pytest.approx(a, rel=0.1)
+
+
+def test_big_steps_find_the_same_clouds(renderer):
+    """A big step outside that hits cloud goes back: with few small clouds, only what it leaps over may be lost."""
+    camera, params = nubis.scenes["fair_weather"]
+    small, big = (
+        renderer(32, 18, twin.fine(512, big_step=b, empty_samples=6)).render_layers(camera, params) for b in (1, 3)
+    )
+    assert np.abs(small["transmittance"] - big["transmittance"]).mean() < 0.01
+    assert big["samples"].sum() < small["samples"].sum()
+
+
+@pytest.mark.parametrize("height", [2.0, 2000.0, 6000.0, 30_000.0])
+@pytest.mark.parametrize("radius", [EARTH, THESIS])
+def test_only_rays_that_meet_the_shell_are_marched(renderer, height, radius):
+    """No sample where the ray misses the shell, past the horizon or beside the planet; some everywhere else."""
+    params = twin.smooth_params(**{"atmosphere.planet_radius": radius})
+    camera = looking(height, -5, 60)
+    directions = twin.pixel_directions(camera, 64, 64).reshape(-1, 3)
+    layers = renderer(64, 64, twin.fine(64)).render_layers(camera, params)
+    samples = layers["samples"].ravel()
+    eye = np.array(camera.eye)
+
+    def in_front(altitude):
+        near, far = twin.sphere_hits(eye, directions, radius, altitude)
+        return near, far, far > 0
+
+    near_top, _, meets_top = in_front(params.clouds.top)
+    near_ground, _, meets_ground = in_front(0.0)
+    if height < params.clouds.base:
+        meets = meets_top & ~(meets_ground & (near_ground > 0))
+    else:
+        meets = meets_top
+    # A pixel within a thousandth of a degree of an edge may go either way.
+    edge = np.zeros_like(meets)
+    for limit in (0.0, params.clouds.base, params.clouds.top):
+        if height > limit:
+            dip = -np.degrees(np.arccos((radius + limit) / (radius + height)))
+            edge |= np.abs(np.degrees(np.arcsin(directions[:, 2])) - dip) < 1e-3
+    assert meets[~edge].any()
+    np.testing.assert_array_equal((samples > 0)[~edge], meets[~edge])
+    assert (near_top[meets & (height > params.clouds.top)] > 0).all()
+
+
+def test_the_horizon_hides_what_is_beyond(renderer):
+    """From 2 m the ground hides every cloud below it; dense clouds stand right above it."""
+    params = twin.smooth_params(**{"clouds.extinction": 0.1})
+    camera = looking(2, 0, 20)
+    layers = renderer(9, 64).render_layers(camera, params)
+    elevation = np.arcsin(twin.pixel_directions(camera, 9, 64)[..., 2])
+    dip = np.arccos(EARTH / (EARTH + 2))
+    assert (layers["transmittance"][elevation < -dip] == 1).all()
+    assert (layers["samples"][elevation < -dip] == 0).all()
+    assert (layers["transmittance"][(elevation > 0) & (elevation < np.radians(5))] < 0.5).all()
+
+
+@pytest.mark.parametrize("radius", [EARTH, 10_000.0])
+def test_an_eye_at_sea_level_stands_on_the_ground(renderer, radius):
+    """At z = 0 the ground hides what is below, as it does from a millimetre above."""
+    params = nubis.Params().with_(**{"atmosphere.planet_radius": radius, "clouds.coverage": 0.8})
+    at, above = (renderer(16, 16).render_layers(looking(z, 0, 60), params) for z in (0.0, 0.001))
+    assert (above["samples"][9:] == 0).all()
+    assert (at["samples"][9:] == 0).all()
+    np.testing.assert_allclose(at["sky"][9:], above["sky"][9:], rtol=1e-2)
+
+
+@pytest.mark.parametrize("scene", nubis.scenes)
+def test_layers_belong_together(renderer, scene):
+    camera, params = nubis.scenes[scene]
+    make = renderer(64, 36)
+    layers = make.render_layers(camera, params)
+    picture = make.render(camera, params)
+    clouds = make.render(camera, params, background=None)
+    alpha = clouds[..., 3]
+    assert alpha.min() >= 0 and alpha.max() <= 1
+    assert clouds[..., :3].min() >= 0
+    np.testing.assert_array_equal(picture[..., 3], 1)
+    np.testing.assert_array_equal(layers["radiance"], clouds[..., :3])
+    np.testing.assert_array_equal(layers["transmittance"], 1 - alpha)
+    over = layers["radiance"] + layers["transmittance"][..., None] * layers["sky"]
+    np.testing.assert_allclose(picture[..., :3], over, rtol=1e-5, atol=1e-6)
+    np.testing.assert_array_equal(np.isfinite(layers["depth"]), layers["transmittance"] < 1)
+    assert (layers["radiance"][layers["transmittance"] == 1] == 0).all()
+
+
+def test_depth_is_where_the_cloud_is(renderer):
+    """Between entering and leaving the shell; on average nearly where float64 finds the scattered light to come from."""
+    camera, params = view_params("below")
+    directions = twin.pixel_directions(camera, 16, 9).reshape(-1, 3)
+    time = twin.cloudy_time(renderer(), params, camera, 0.05, 0.8)
+    layers = renderer(16, 9, twin.fine(512)).render_layers(camera, params, time=time)
+    starts = np.broadcast_to(np.array(camera.eye), directions.shape)
+    ends = twin.ray_ends(camera.eye, directions, params)
+    depth, points = twin.optical_depths(renderer(), params, starts, directions, ends, 4000, time)
+    weight = np.exp(depth - np.cumsum(depth, axis=1)) * -np.expm1(-depth)
+    distance = np.linalg.norm(points - starts[:, None], axis=2)
+    expected = (weight * distance).sum(axis=1) / weight.sum(axis=1)
+    np.testing.assert_allclose(layers["depth"].ravel(), expected, rtol=2e-3)
+
+
+def test_a_wide_view_is_made_of_narrow_ones(renderer):
+    """The middle rows of a picture are the picture of a smaller angle: no row knows of the others."""
+    params = nubis.Params().with_(**{"clouds.coverage": 0.6})
+    method = nubis.quality("draft").replace(jitter=False)
+    whole = renderer(40, 72, method).render(looking(200, 15, 60), params)
+    narrow = 2 * np.degrees(np.arctan(np.tan(np.radians(30)) / 3))
+    middle = renderer(40, 24, method).render(looking(200, 15, narrow), params)
+    np.testing.assert_allclose(whole[24:48], middle, rtol=2e-2, atol=2e-3)
+    assert twin.relative_rmse(whole[24:48, :, :3], middle[..., :3]) < 1e-3
+
+
+def test_bands_do_not_show(renderer):
+    """A picture comes in bands as long as time allows: a new renderer, one used to light work and one to hard work agree."""
+    size = 128, 256
+    camera, params = looking(200, 10, 70), nubis.Params().with_(**{"clouds.coverage": 0.6})
+    hard = params.with_(**{"clouds.extinction": 1e-4, "clouds.coverage": 1.0})
+    pictures = []
+    for warm_up in ([], [params.with_(**{"clouds.coverage": 0.0})] * 3, [hard]):
+        make = nubis.Renderer(*size, quality="draft")
+        for other in warm_up:
+            make.render(camera, other)
+        pictures.append(make.render(camera, params).tobytes())
+    assert pictures[0] == pictures[1] == pictures[2]
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 64), (64, 1), (7, 5), (33, 17)])
+def test_any_size(renderer, size):
+    camera, params = nubis.scenes["fair_weather"]
+    layers = renderer(*size).render_layers(camera, params)
+    assert layers["radiance"].shape == (size[1], size[0], 3)
+    assert np.isfinite(layers["radiance"]).all() and np.isfinite(layers["sky"]).all()
+
+
+def test_the_view_ends_at_the_view_distance(renderer):
+    """Nothing is marched beyond it."""
+    camera, params = view_params("horizon")
+    short = renderer(16, 9, twin.fine(64, view_distance=1000.0)).render_layers(camera, params)
+    assert (short["transmittance"] == 1).all() and (short["samples"] == 0).all()
+
+
+HEIGHTS = [-5.0, 0.01, 1199.99, 1200.01, 3199.99, 3200.01, 20_000.0, 400_000.0, 4e7]
+
+
+@pytest.mark.parametrize("height", HEIGHTS)
+def test_anywhere(renderer, height):
+    """On the ground, a centimetre from each side of the shell, in orbit: finite and in range in all directions."""
+    params = nubis.Params().with_(**{"clouds.coverage": 0.6, "clouds.base": 1200.0, "clouds.top": 3200.0})
+    layers = renderer(64, 32).render_layers(nubis.Camera.equirect((0, 0, height)), params)
+    check_range(layers)
+
+
+@pytest.mark.parametrize("shell", [1200.0, 3200.0])
+@pytest.mark.parametrize("elevation", [-20.0, -0.2, 0.0, 0.2, 20.0])
+def test_crossing_a_boundary_shows_nothing(renderer, shell, elevation):
+    """A centimetre more of height changes hardly a pixel."""
+    params = nubis.Params().with_(**{"clouds.coverage": 0.9, "clouds.base": 1200.0, "clouds.top": 3200.0})
+    method = nubis.quality("high").replace(jitter=False)
+    under, over = (
+        renderer(16, 9, method).render_layers(looking(shell + dz, elevation, 4), params)["transmittance"]
+        for dz in (-0.01, 0.01)
+    )
+    assert np.abs(under - over).mean() < 0.01
+
+
+STRESS = [
+    {"clouds.extinction": 1e-8},
+    {"clouds.extinction": 1e8},
+    {"light.g": 0.9999, "light.g_back": -0.9999},
+    {"light.g": -0.9999},
+    {"clouds.coverage": 0.0},
+    {"clouds.coverage": 1.0, "clouds.precipitation": 1.0},
+    {"clouds.detail": 1.0},
+    {"sun.elevation": 0.0},
+    {"sun.elevation": -0.3},
+    {"sun.elevation": -90.0},
+    {"sun.elevation": 90.0},
+    {"clouds.base": 2000.0, "clouds.top": 2000.01},
+    {"clouds.base": 0.0, "clouds.top": 25_000.0},
+    {"atmosphere.planet_radius": 10_000.0},
+    {"atmosphere.planet_radius": 1e9},
+    {"atmosphere.haze": 20.0},
+    {"high_clouds.coverage": 1.0, "high_clouds.altitude": 2000.0},
+]
+
+
+@pytest.mark.parametrize("changes", STRESS, ids=lambda changes: ", ".join(f"{k}={v:g}" for k, v in changes.items()))
+@pytest.mark.parametrize("model", ["single", "thesis2018"])
+def test_extreme_parameters(renderer, changes, model):
+    camera, params = nubis.scenes["fair_weather"]
+    check_range(renderer(32, 18).render_layers(camera, params.with_(**{"light.model": model, **changes})))
+
+
+@pytest.mark.parametrize("time", [-1e6, 86_400.0, 2.6e6, 1e12])
+def test_any_time(renderer, time):
+    camera, params = nubis.scenes["cirrus"]
+    check_range(renderer(32, 18).render_layers(camera, params, time=time))
+
+
+def check_range(layers):
+    assert np.isfinite(layers["radiance"]).all() and (layers["radiance"] >= 0).all()
+    assert np.isfinite(layers["sky"]).all() and (layers["sky"] >= 0).all()
+    assert layers["transmittance"].min() >= 0 and layers["transmittance"].max() <= 1
+    assert (layers["depth"] > 0).all()

@@ -59,7 +59,7 @@ def _make() -> dict[str, tuple[Camera, Params]]:
         ),
         "above": (
             _look((0, 0, 3500), 20, -10),
-            fair.with_(**{"sun.elevation": 30.0, "sun.azimuth": 320.0}),
+            fair.with_(**{"clouds.coverage": 0.52, "sun.elevation": 30.0, "sun.azimuth": 320.0}),
         ),
         "cirrus": (
             _look((0, 0, 200), 300, 25),

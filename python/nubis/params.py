@@ -84,10 +84,10 @@ class Clouds(Block):
     seed: int = 1
     noise: Literal["nubis2015", "vsu2022"] = "nubis2015"
     shape_scale: float = 5200.0
-    detail_scale: float = 640.0
-    detail: float = 0.38
-    curl_scale: float = 2400.0
-    curl: float = 90.0
+    detail_scale: float = 420.0
+    detail: float = 0.4
+    curl_scale: float = 1600.0
+    curl: float = 70.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -251,7 +251,7 @@ class Light(Block):
     lobe_mix: float = 0.5
     albedo: float = 0.999
     sun_gain: float = 2.2
-    absorption: float = 0.18
+    absorption: float = 0.22
     ambient_gain: float = 1.0
     ambient_top: tuple[float, float, float] = (1.0, 1.0, 1.0)
     ambient_bottom: tuple[float, float, float] = (1.0, 1.0, 1.0)

@@ -67,13 +67,13 @@ params! {
         /// Width of one tile of the base shape.
         shape_scale: f32 = 5200.0, in 100..=200000 "m";
         /// Width of one tile of the detail that erodes the edges.
-        detail_scale: f32 = 640.0, in 10..=50000 "m";
+        detail_scale: f32 = 420.0, in 10..=50000 "m";
         /// How deep the detail erodes the edges (nubis2015: 0.2).
-        detail: f32 = 0.38, in 0..=1 "";
+        detail: f32 = 0.4, in 0..=1 "";
         /// Width of one tile of the curl noise that swirls the detail.
-        curl_scale: f32 = 2400.0, in 10..=50000 "m";
+        curl_scale: f32 = 1600.0, in 10..=50000 "m";
         /// How far curl noise displaces the detail at the base.
-        curl: f32 = 90.0, in 0..=2000 "m";
+        curl: f32 = 70.0, in 0..=2000 "m";
     }
 
     /// The weather map: where the clouds stand.
@@ -149,7 +149,7 @@ params! {
         /// Gain of the sunlight in the models that do not conserve energy (all but `single`).
         sun_gain: f32 = 2.2, in 0..=1000 "";
         /// How thick the models that do not conserve energy take the cloud to be on the way to the sun (all but `single`).
-        absorption: f32 = 0.18, in 0..=10 "";
+        absorption: f32 = 0.22, in 0..=10 "";
         /// Gain of the ambient light (all but `single`).
         ambient_gain: f32 = 1.0, in 0..=1000 "";
         /// Tint of the ambient light at the top of the clouds; its brightness comes from the sky.

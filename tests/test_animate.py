@@ -1,0 +1,187 @@
+"""Animation: stills at its cuts, the still in the end where nothing moves, and close to it where something does."""
+
+import numpy as np
+import pytest
+import twin
+
+import nubis
+from nubis import ParameterError
+
+SIZE = 96, 54
+CAMERA, PARAMS = nubis.scenes["fair_weather"]
+
+
+def colours(frame):
+    assert np.isfinite(frame).all()
+    return frame[..., :3]
+
+
+@pytest.mark.parametrize("scene", ["fair_weather", "above", "in_cloud"])
+def test_a_static_shot_becomes_the_still(renderer, scene):
+    camera, params = nubis.scenes[scene]
+    make = renderer(*SIZE)
+    still = make.render(camera, params)
+    frames = list(make.animate([(camera, params, 0.0)] * 32))
+    assert frames[0].tobytes() == still.tobytes()
+    assert frames[0].shape == still.shape and frames[0].dtype == np.float32
+    for frame in frames:
+        assert twin.relative_rmse(colours(frame), colours(still)) < 0.1
+    assert twin.relative_rmse(colours(frames[-1]), colours(still)) < 0.02
+
+
+def test_without_background(renderer):
+    make = renderer(*SIZE)
+    still = make.render(CAMERA, PARAMS, background=None)
+    *_, last = make.animate([(CAMERA, PARAMS, 0.0)] * 32, background=None)
+    assert last[..., 3].min() >= 0 and last[..., 3].max() <= 1
+    assert np.abs(last[..., 3] - still[..., 3]).mean() < 0.02
+
+
+def look(azimuth, eye=(0, 0, 300)):
+    return nubis.Camera.look_at(eye, eye + twin.compass(azimuth, 12))
+
+
+MOVES = {
+    "time": lambda i: (look(0), PARAMS, i / 24),
+    "turn": lambda i: (look(0.3 * i), PARAMS, i / 24),
+    "flight": lambda i: (look(0, (0, 5.0 * i, 300)), PARAMS, i / 24),
+    "climb through the clouds": lambda i: (look(0, (0, 0, 1000 + 30.0 * i)), PARAMS, i / 24),
+    "sun": lambda i: (look(0), PARAMS.with_(**{"sun.azimuth": 100 + 0.2 * i}), 0.0),
+    "coverage": lambda i: (look(0), PARAMS.with_(**{"clouds.coverage": 0.45 + 0.002 * i}), 0.0),
+}
+
+
+@pytest.mark.parametrize("move", MOVES)
+def test_what_moves_stays_near_the_still(renderer, move):
+    shots = [MOVES[move](i) for i in range(40)]
+    make = renderer(*SIZE)
+    for i, frame in enumerate(make.animate(shots)):
+        if i % 13 == 0:
+            camera, params, time = shots[i]
+            still = renderer(*SIZE).render(camera, params, time=time)
+            assert twin.relative_rmse(colours(frame), colours(still)) < 0.15
+        colours(frame)
+
+
+CUTS = {
+    "turn": (look(120), PARAMS, 0.0),
+    "lens": (nubis.Camera.look_at((0, 0, 300), (0, 1000, 500), fov_y=20), PARAMS, 0.0),
+    "jump": (look(0, (50_000, 0, 300)), PARAMS, 0.0),
+    "later": (look(0), PARAMS, 3600.0),
+    "projection": (nubis.Camera.equirect((0, 0, 300)), PARAMS, 0.0),
+    "weather": (look(0), PARAMS.with_(**{"weather.seed": 99}), 0.0),
+    "light": (look(0), PARAMS.with_(**{"light.model": "single"}), 0.0),
+}
+
+
+@pytest.mark.parametrize("cut", CUTS)
+def test_a_cut_shows_nothing_of_the_shot_before(renderer, cut):
+    make = renderer(*SIZE)
+    *_, last = make.animate([(look(0), PARAMS, 0.0)] * 3 + [CUTS[cut]])
+    camera, params, time = CUTS[cut]
+    assert last.tobytes() == make.render(camera, params, time=time).tobytes()
+
+
+def test_a_new_animation_is_a_cut(renderer):
+    make = renderer(*SIZE)
+    list(make.animate([(look(0.0), PARAMS, 0.0)] * 3))
+    shot = look(0.5), PARAMS, 0.1
+    (first,) = make.animate([shot])
+    assert first.tobytes() == make.render(*shot[:2], time=shot[2]).tobytes()
+
+
+def test_the_same_animation_twice(renderer):
+    shots = [MOVES["flight"](i) for i in range(6)]
+    once, twice = ([f.tobytes() for f in renderer(*SIZE).animate(shots)] for _ in range(2))
+    assert once == twice
+
+
+def test_other_calls_in_between_change_nothing(renderer):
+    shots = [MOVES["turn"](i) for i in range(6)]
+    make = renderer(*SIZE)
+    alone = [f.tobytes() for f in make.animate(shots)]
+    disturbed = []
+    for frame in make.animate(shots):
+        disturbed.append(frame.tobytes())
+        make.render(*nubis.scenes["sunset"])
+        make.density([[0, 0, 2000]], PARAMS)
+    assert alone == disturbed
+
+
+@pytest.mark.parametrize("size", [(1, 1), (5, 3), (33, 17)])
+def test_sizes_that_four_does_not_divide(renderer, size):
+    make = renderer(*size)
+    still = make.render(CAMERA, PARAMS)
+    *_, last = make.animate([(CAMERA, PARAMS, 0.0)] * 32)
+    assert twin.relative_rmse(colours(last), colours(still)) < 0.02
+
+
+def test_frames_are_made_one_by_one(renderer):
+    """A shot is asked for when its frame is; an endless animation can be left at any time."""
+    asked = []
+
+    def shots():
+        while True:
+            asked.append(len(asked))
+            yield CAMERA, PARAMS, len(asked) / 24
+
+    frames = renderer(16, 9).animate(shots())
+    assert iter(frames) is frames and asked == []
+    next(frames)
+    assert asked == [0]
+    next(frames)
+    assert asked == [0, 1]
+    frames.close()
+    assert asked == [0, 1]
+
+
+def test_frames_are_arrays_of_their_own(renderer):
+    first, second = renderer(16, 9).animate([(CAMERA, PARAMS, 0.0)] * 2)
+    assert not np.shares_memory(first, second)
+    first[:] = 0
+    assert second.max() > 0
+
+
+def test_no_shots(renderer):
+    assert list(renderer(16, 9).animate([])) == []
+
+
+def test_progress(renderer):
+    """A wrapper such as tqdm sees every shot, and what it returns is what is rendered."""
+    seen = []
+
+    def progress(shots):
+        for shot in shots:
+            seen.append(shot)
+            yield shot
+
+    shots = [(CAMERA, PARAMS, float(i)) for i in range(3)]
+    assert len(list(renderer(16, 9).animate(shots, progress=progress))) == 3
+    assert seen == shots
+
+
+@pytest.mark.parametrize(
+    ("named", "shot"),
+    [
+        ("shot", None),
+        ("shot", (CAMERA, PARAMS)),
+        ("camera", (None, PARAMS, 0.0)),
+        ("params", (CAMERA, None, 0.0)),
+        ("time", (CAMERA, PARAMS, float("nan"))),
+        ("time", (CAMERA, PARAMS, "now")),
+    ],
+)
+def test_bad_shots(renderer, named, shot):
+    """The frames before are delivered, and the renderer goes on working."""
+    make = renderer(16, 9)
+    frames = make.animate([(CAMERA, PARAMS, 0.0), shot])
+    next(frames)
+    with pytest.raises(ParameterError, match="is not allowed") as error:
+        next(frames)
+    assert str(error.value).startswith(named)
+    assert len(list(make.animate([(CAMERA, PARAMS, 0.0)]))) == 1
+
+
+def test_a_bad_background_is_refused_at_once(renderer):
+    with pytest.raises(ParameterError, match="background"):
+        renderer(16, 9).animate([], background="black")

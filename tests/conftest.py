@@ -8,8 +8,8 @@ import pytest
 
 os.environ.setdefault("NUBIS_ADAPTER", "cpu")
 
-import nubis  # noqa: E402 (the adapter is chosen first)
-import nubis.testing  # noqa: E402
+import nubis
+import nubis.testing
 
 # Probes share a renderer: what it bakes takes longer than they do.
 nubis.testing.Renderer = functools.cache(nubis.Renderer)
@@ -17,7 +17,8 @@ nubis.testing.Renderer = functools.cache(nubis.Renderer)
 
 def pytest_report_header():
     adapter = nubis.Renderer(1, 1).adapter
-    return f"nubis {nubis.__version__} on {adapter.name} ({adapter.kind}), {adapter.driver}, {adapter.backend}"
+    about = f"{adapter.name} ({adapter.kind}), {adapter.driver}, {adapter.backend}"
+    return f"nubis {nubis.__version__} on {about}"
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -5,9 +5,9 @@ import pickle
 
 import numpy as np
 import pytest
-import twin
 
 import nubis
+import twin
 from nubis import Camera, ParameterError
 
 
@@ -38,9 +38,13 @@ def test_equirect(renderer, pixel):
 
 
 @pytest.mark.parametrize("fov", [180.0, 120.0])
-@pytest.mark.parametrize(("azimuth", "side"), [(0, "top"), (90, "left"), (180, "bottom"), (270, "right"), (30, "top")])
+@pytest.mark.parametrize(
+    ("azimuth", "side"), [(0, "top"), (90, "left"), (180, "bottom"), (270, "right"), (30, "top")]
+)
 def test_fisheye(renderer, azimuth, side, fov):
-    """Equidistant: the angle from the zenith grows linearly. North on top and, seen from below, east on the left."""
+    """Equidistant: the angle from the zenith grows linearly. North on top and, seen from below,
+    east on the left.
+    """
     width, height = size = 96, 64
     angle = 40.0
     r = angle / (0.5 * fov) * 32
@@ -51,12 +55,19 @@ def test_fisheye(renderer, azimuth, side, fov):
     sun = np.degrees(np.arctan2(-dx, -dy)), 90 - np.hypot(dx, dy) / 32 * 0.5 * fov
     found = brightest(renderer, Camera.fisheye((0, 0, 2), fov=fov), *sun, size)
     assert found == (int(x), int(y))
-    offset = {"top": 32 - found[1], "bottom": found[1] - 32, "left": 48 - found[0], "right": found[0] - 48}
+    offset = {
+        "top": 32 - found[1],
+        "bottom": found[1] - 32,
+        "left": 48 - found[0],
+        "right": found[0] - 48,
+    }
     assert max(offset, key=offset.get) == side
 
 
 def test_fisheye_that_looks_at_the_horizon(renderer):
-    """Its top is as far north as can be: looking south that is the zenith, and east is on the left."""
+    """Its top is as far north as can be: looking south that is the zenith, and east is on the
+    left.
+    """
     camera = Camera.fisheye((0, 0, 2), up=(0, -1, 0), fov=180)
     x, y = brightest(renderer, camera, 150, 20, (64, 64))
     assert x < 30 and y < 30
@@ -70,7 +81,11 @@ def test_fisheye_shows_nothing_outside_its_circle(renderer):
     assert (image[~outside][:, 3] == 1).all()
 
 
-LOOKS = [((0, 0, 2), (0, 100, 40), (0, 0, 1)), ((10, -20, 300), (-50, 30, 290), (0.2, 0.1, 1)), ((0, 0, 50), (1, 0, 50), (0, 1, 1))]
+LOOKS = [
+    ((0, 0, 2), (0, 100, 40), (0, 0, 1)),
+    ((10, -20, 300), (-50, 30, 290), (0.2, 0.1, 1)),
+    ((0, 0, 50), (1, 0, 50), (0, 1, 1)),
+]
 
 
 @pytest.mark.parametrize(("eye", "target", "up"), LOOKS)
@@ -98,10 +113,17 @@ def test_looking_north_east_is_on_the_right():
 
 @pytest.mark.parametrize(("eye", "target", "up"), LOOKS)
 def test_matrices(renderer, eye, target, up):
-    """OpenGL: x right, y up, looking down -z. OpenCV: x right, y down, looking down z. Same camera, same picture."""
+    """OpenGL: x right, y up, looking down -z. OpenCV: x right, y down, looking down z. Same
+    camera, same picture.
+    """
     camera = Camera.look_at(eye, target, up, 50.0)
     opengl = np.eye(4)
-    opengl[:3, 0], opengl[:3, 1], opengl[:3, 2], opengl[:3, 3] = camera.right, camera.up, -np.array(camera.forward), eye
+    opengl[:3, 0], opengl[:3, 1], opengl[:3, 2], opengl[:3, 3] = (
+        camera.right,
+        camera.up,
+        -np.array(camera.forward),
+        eye,
+    )
     opencv = opengl @ np.diag([1, -1, -1, 1])
     np.testing.assert_allclose(camera.matrix(), opengl)
     a = Camera.from_matrix(opengl, 50.0)
@@ -155,10 +177,16 @@ def test_cameras_are_values(camera):
 
 
 def test_defaults():
-    assert Camera.look_at((0, 0, 2), (0, 1, 2)) == Camera.look_at((0, 0, 2), (0, 1, 2), (0, 0, 1), 60.0)
+    assert Camera.look_at((0, 0, 2), (0, 1, 2)) == Camera.look_at(
+        (0, 0, 2), (0, 1, 2), (0, 0, 1), 60.0
+    )
     assert Camera.fisheye((0, 0, 2)) == Camera.fisheye((0, 0, 2), (0, 0, 1), 180.0)
     # Any three numbers are a point.
-    assert Camera.equirect(np.array([1, 2, 3])) == Camera.equirect([1.0, 2.0, 3.0]) == Camera.equirect((1, 2, np.float32(3)))
+    assert (
+        Camera.equirect(np.array([1, 2, 3]))
+        == Camera.equirect([1.0, 2.0, 3.0])
+        == Camera.equirect((1, 2, np.float32(3)))
+    )
 
 
 NAN, INF = float("nan"), float("inf")

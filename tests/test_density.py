@@ -1,12 +1,14 @@
-"""The cloud field: the published formulas in float64, where there is cloud and where not, seeds, wind and maps."""
+"""The cloud field: the published formulas in float64, where there is cloud and where not, seeds,
+wind and maps.
+"""
 
 import math
 
 import numpy as np
 import pytest
-import twin
 
 import nubis
+import twin
 from nubis.testing import probe
 
 FBM = np.array([0.625, 0.25, 0.125])
@@ -20,7 +22,9 @@ def grid(*axes):
 def profile_constants():
     """The three published gradients are tuned; only how they are used is fixed."""
     names = ["STRATUS", "STRATOCUMULUS", "CUMULUS"]
-    return np.array([probe(name, [0.0], imports=["density"])[0] for name in names], dtype=np.float64)
+    return np.array(
+        [probe(name, [0.0], imports=["density"])[0] for name in names], dtype=np.float64
+    )
 
 
 def smoothstep(a, b, v):
@@ -59,7 +63,11 @@ def test_height_profile():
     np.testing.assert_allclose(got, height_profile(*inputs.T, constants), atol=2e-4)
     for kind, (a, b, c, d) in zip((0, 0.5, 1), constants, strict=True):
         assert 0 <= a < b <= c < d <= 1
-        ends = probe("height_profile(x.x, x.y)", [(a, kind), (0.5 * (b + c), kind), (d, kind)], imports=["density"])
+        ends = probe(
+            "height_profile(x.x, x.y)",
+            [(a, kind), (0.5 * (b + c), kind), (d, kind)],
+            imports=["density"],
+        )
         np.testing.assert_allclose(ends[:, 0], [0, 1, 0], atol=1e-5)
 
 
@@ -94,7 +102,8 @@ def test_erosion(depth):
     np.testing.assert_allclose(got[proper], expected[proper], atol=1e-5)
 
 
-WEATHER = "vec4f(weather_from_map(x.xyz).coverage, weather_from_map(x.xyz).kind, weather_from_map(x.xyz).precipitation, 0.0)"
+FIELDS = ("coverage", "kind", "precipitation")
+WEATHER = f"vec4f({', '.join(f'weather_from_map(x.xyz).{field}' for field in FIELDS)}, 0.0)"
 
 
 def local_weather(texels, **clouds):
@@ -122,7 +131,9 @@ def test_type_shifts_the_map():
 
 
 def test_rain_brings_cloud():
-    """nubis2015: where precipitation is 1, coverage is at least 0.7 and the type pushed toward cumulonimbus."""
+    """nubis2015: where precipitation is 1, coverage is at least 0.7 and the type pushed toward
+    cumulonimbus.
+    """
     texels = grid([0.0, 0.5, 1.0], [0.0, 0.5], [1.0])
     coverage, kind, rain = local_weather(texels, coverage=0.5, type=0.5, precipitation=1.0)
     assert coverage.min() >= 0.7 - 1e-6
@@ -149,7 +160,9 @@ def points_in_shell(rng, params, n, reach):
 
 @pytest.mark.parametrize("time", [0.0, 7200.0])
 def test_density_is_the_published_sampler(renderer, rng, time):
-    """Everything but the texture reads in float64: wind, lean, curl, height, shape, coverage and erosion."""
+    """Everything but the texture reads in float64: wind, lean, curl, height, shape, coverage and
+    erosion.
+    """
     params = cloudy_params(**{"clouds.type": 0.5, "wind.weather_speed": 0.0})
     c, w = params.clouds, params.wind
     points, altitude = points_in_shell(rng, params, 4000, 30_000)
@@ -161,7 +174,8 @@ def test_density_is_the_published_sampler(renderer, rng, time):
         return np.column_stack([xy - time * speed * downwind, altitude - time * w.updraft])
 
     def read(texture, uvw):
-        wgsl = f"textureSampleLevel({texture}, repeat_sampler, {'x.xy' if 'curl' in texture else 'x.xyz'}, 0.0)"
+        at = "x.xy" if texture == "curl_noise" else "x.xyz"
+        wgsl = f"textureSampleLevel({texture}, repeat_sampler, {at}, 0.0)"
         return probe(wgsl, np.mod(uvw, 1), imports=["bindings"], params=params).astype(np.float64)
 
     noise = read("shape_noise", moved(at, w.speed) / c.shape_scale)
@@ -218,7 +232,9 @@ def test_nothing_outside_the_shell(renderer, rng):
     radius, base, top = params.atmosphere.planet_radius, params.clouds.base, params.clouds.top
     level = np.zeros((2000, 3))
     level[:, :2] = rng.uniform(-150_000, 150_000, (2000, 2))
-    outside = [twin.raised(level, radius, h) for h in (0, 0.5 * base, base - 0.5, top + 0.5, top + 5000)]
+    outside = [
+        twin.raised(level, radius, h) for h in (0, 0.5 * base, base - 0.5, top + 0.5, top + 5000)
+    ]
     for points in outside:
         # The first point is the origin of the others: put it in their midst.
         assert (renderer().density(np.vstack([[0, 0, base], points]), params) == 0).all()
@@ -230,7 +246,9 @@ def test_nothing_outside_the_shell(renderer, rng):
 
 
 def test_seeds(renderer, rng):
-    """Same seeds, same bytes, also after others were baked; another seed or noise is another field."""
+    """Same seeds, same bytes, also after others were baked; another seed or noise is another
+    field.
+    """
     params = nubis.Params().with_(**{"clouds.coverage": 0.6})
     points, _ = points_in_shell(rng, params, 4000, 60_000)
 
@@ -250,7 +268,9 @@ def test_seeds(renderer, rng):
 def test_extinction_scales_the_field(renderer, rng):
     params = cloudy_params()
     points, _ = points_in_shell(rng, params, 1000, 10_000)
-    one, small = (renderer().density(points, params.with_(**{"clouds.extinction": k})) for k in (1.0, 0.02))
+    one, small = (
+        renderer().density(points, params.with_(**{"clouds.extinction": k})) for k in (1.0, 0.02)
+    )
     assert one.max() <= 1
     np.testing.assert_allclose(small, 0.02 * one, rtol=1e-6)
 
@@ -262,9 +282,13 @@ def wind_params(direction, speed, **changes):
     return nubis.Params().with_(**{"clouds.coverage": 0.6, **values, **changes})
 
 
-@pytest.mark.parametrize(("time", "speed"), [(600.0, 20.0), (86_400.0, 15.0), (1e6, 1.5), (-3600.0, 10.0)])
+@pytest.mark.parametrize(
+    ("time", "speed"), [(600.0, 20.0), (86_400.0, 15.0), (1e6, 1.5), (-3600.0, 10.0)]
+)
 def test_wind_carries_the_field(renderer, rng, time, speed):
-    """All winds alike: what was here is there, at the same height above the curved ground, after a minute or a month."""
+    """All winds alike: what was here is there, at the same height above the curved ground, after
+    a minute or a month.
+    """
     direction = 60.0
     params = wind_params(direction, speed)
     radius = params.atmosphere.planet_radius
@@ -295,14 +319,18 @@ def test_long_times_lose_nothing(renderer, periods):
     )
     camera = nubis.Camera.look_at((0, 0, 100), (0, 1000, 400))
     period = 5000.0
-    first, later, between = (renderer().render(camera, params, time=t) for t in (0, periods * period, 0.5 * period))
+    first, later, between = (
+        renderer().render(camera, params, time=t) for t in (0, periods * period, 0.5 * period)
+    )
     assert later.tobytes() == first.tobytes()
     assert between.tobytes() != first.tobytes()
 
 
 def test_updraft_lifts_the_shapes(renderer, rng):
     """Rising by a whole tile of the base shape changes nothing; by half a tile it does."""
-    params = cloudy_params(**{"wind.speed": 0.0, "wind.detail_speed": 0.0, "wind.updraft": 2.0, "clouds.detail": 0.0})
+    params = cloudy_params(
+        **{"wind.speed": 0.0, "wind.detail_speed": 0.0, "wind.updraft": 2.0, "clouds.detail": 0.0}
+    )
     scale = params.clouds.shape_scale
     points, _ = points_in_shell(rng, params, 500, 10_000)
     still = renderer().density(points, params)
@@ -312,15 +340,25 @@ def test_updraft_lifts_the_shapes(renderer, rng):
     assert np.abs(half - still).max() > 0.1 * params.clouds.extinction
 
 
-@pytest.mark.parametrize(("half", "direction"), [("north", (0, 1)), ("south", (0, -1)), ("east", (1, 0)), ("west", (-1, 0))])
+@pytest.mark.parametrize(
+    ("half", "direction"),
+    [("north", (0, 1)), ("south", (0, -1)), ("east", (1, 0)), ("west", (-1, 0))],
+)
 def test_a_map_of_your_own(renderer, rng, half, direction):
-    """Row 0 is the north edge, column 0 the west edge, and the middle of the map is the origin of the world."""
+    """Row 0 is the north edge, column 0 the west edge, and the middle of the map is the origin of
+    the world.
+    """
     weather = np.zeros((64, 64, 3))
     rows = {"north": np.s_[:32], "south": np.s_[32:], "east": np.s_[:, 32:], "west": np.s_[:, :32]}
     weather[rows[half]] = [1.0, 0.5, 0.0]
     extent = 40_000.0
     params = nubis.Params().with_(
-        **{"clouds.coverage": 0.5, "weather.map": weather, "weather.extent": extent, "wind.shear": 0.0}
+        **{
+            "clouds.coverage": 0.5,
+            "weather.map": weather,
+            "weather.extent": extent,
+            "wind.shear": 0.0,
+        }
     )
     points, _ = points_in_shell(rng, params, 4000, 0.5 * extent)
     side = points[:, :2] @ direction
@@ -330,7 +368,7 @@ def test_a_map_of_your_own(renderer, rng, half, direction):
     cloudy = renderer().density(points, params) > 0
     assert not cloudy[sure & (side < 0)].any()
     assert cloudy[sure & (side > 0)].mean() > 0.3
-    beyond = renderer().density(points + [extent, -extent, 0], params) > 0
+    beyond = renderer().density(points + np.array([extent, -extent, 0]), params) > 0
     assert not beyond[sure & (side < 0)].any()
 
 
@@ -345,7 +383,9 @@ def test_the_weather_drifts_on_its_own_wind(renderer, rng):
     weather = np.zeros((8, 8, 3))
     weather[3:5, 3:5] = [1.0, 0.5, 0.0]
     drift = {"wind.weather_direction": 90.0, "wind.weather_speed": 10.0, "wind.shear": 0.0}
-    params = nubis.Params().with_(**{"clouds.coverage": 0.5, "weather.map": weather, "weather.extent": 64_000.0, **drift})
+    params = nubis.Params().with_(
+        **{"clouds.coverage": 0.5, "weather.map": weather, "weather.extent": 64_000.0, **drift}
+    )
     points, _ = points_in_shell(rng, params, 8000, 32_000)
     extinction = renderer().density(points, params, time=1200.0)
     centre = (points[:, :2] * extinction[:, None]).sum(axis=0) / extinction.sum()

@@ -25,10 +25,14 @@ def picture():
 @pytest.mark.parametrize("channels", [3, 4])
 def test_srgb8(picture, tonemap, channels):
     pixels = to_srgb8(picture[..., :channels], tonemap=tonemap)
-    assert pixels.shape == (5, 6, channels) and pixels.dtype == np.uint8 and pixels.flags.c_contiguous
+    assert (
+        pixels.shape == (5, 6, channels) and pixels.dtype == np.uint8 and pixels.flags.c_contiguous
+    )
     if channels == 4:
         np.testing.assert_array_equal(pixels[..., 3], np.round(picture[..., 3] * 255))
-    np.testing.assert_array_equal(pixels[..., :3], to_srgb8(picture[..., :3].tolist(), tonemap=tonemap))
+    np.testing.assert_array_equal(
+        pixels[..., :3], to_srgb8(picture[..., :3].tolist(), tonemap=tonemap)
+    )
 
 
 @pytest.mark.parametrize("tonemap", TONE_MAPS)
@@ -56,7 +60,9 @@ def test_exposure_is_in_stops(picture, tonemap):
     colours = picture[..., :3]
     for stops in (-2, 1, 3):
         exposed = to_srgb8(colours, exposure=stops, tonemap=tonemap)
-        np.testing.assert_array_equal(exposed, to_srgb8(colours * np.float32(2.0**stops), tonemap=tonemap))
+        np.testing.assert_array_equal(
+            exposed, to_srgb8(colours * np.float32(2.0**stops), tonemap=tonemap)
+        )
 
 
 @pytest.mark.parametrize("tonemap", TONE_MAPS)
@@ -90,7 +96,7 @@ def test_wrong_arguments(picture, named, call):
 
 
 def read_png(path):
-    """The pixels of an 8-bit RGB or RGBA file without interlacing (W3C PNG, sections 5, 7 and 9)."""
+    """The pixels of an 8-bit RGB or RGBA file without interlacing (W3C PNG, sections 5, 7, 9)."""
     data = path.read_bytes()
     assert data[:8] == b"\x89PNG\r\n\x1a\n"
     at, compressed = 8, b""
@@ -126,7 +132,9 @@ def test_png(picture, tmp_path, channels):
 
 
 def test_png_with_alpha(picture, tmp_path):
-    """Alpha as it is; colours no longer multiplied by it, so that compositing multiplies them again."""
+    """Alpha as it is; colours no longer multiplied by it, so that compositing multiplies them
+    again.
+    """
     picture[..., :3] *= 0.1 * picture[..., 3:]
     nubis.save(tmp_path / "clouds.PNG", picture, tonemap="none")
     pixels = read_png(tmp_path / "clouds.PNG").astype(float)
@@ -134,7 +142,9 @@ def test_png_with_alpha(picture, tmp_path):
     np.testing.assert_array_equal(pixels[..., 3], premultiplied[..., 3])
     alpha = pixels[..., 3:] / 255
     room = premultiplied[..., :3] <= pixels[..., 3:]
-    np.testing.assert_allclose((pixels[..., :3] * alpha)[room], premultiplied[..., :3][room], atol=0.51)
+    np.testing.assert_allclose(
+        (pixels[..., :3] * alpha)[room], premultiplied[..., :3][room], atol=0.51
+    )
     assert (pixels[pixels[..., 3] == 0] == 0).all()
 
 
@@ -156,7 +166,9 @@ def test_npy(picture, tmp_path, channels):
 
 
 def test_hdr(picture, tmp_path):
-    """Radiance's format: a mantissa of 8 bits a colour and a common exponent; a row of 6 pixels is not compressed."""
+    """Radiance's format: a mantissa of 8 bits a colour and a common exponent; a row of 6 pixels
+    is not compressed.
+    """
     path = tmp_path / "sky.hdr"
     nubis.save(path, picture)
     data = path.read_bytes()

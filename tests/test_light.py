@@ -1,10 +1,12 @@
-"""Light in the clouds: single scattering against a float64 marcher, sun shadows, and the published models."""
+"""Light in the clouds: single scattering against a float64 marcher, sun shadows, and the
+published models.
+"""
 
 import numpy as np
 import pytest
-import twin
 
 import nubis
+import twin
 from nubis.testing import probe
 
 MODELS = ["single", "nubis2015", "thesis2018", "vsu2022"]
@@ -25,7 +27,8 @@ def lit_params(**changes):
     )
 
 
-# Narrow views: the level of detail that a pixel takes for its width is then the one that `density` reads.
+# Narrow views: the level of detail that a pixel takes for its width is then the one that `density`
+# reads.
 CAMERAS = {
     "below": nubis.Camera.look_at((0, 0, 100), (300, 1000, 1200), fov_y=4),
     "inside": nubis.Camera.look_at((0, 0, 1500), (300, 1000, 1550), fov_y=3),
@@ -36,18 +39,24 @@ CAMERAS = {
 @pytest.mark.parametrize("g", [0.6, -0.4])
 @pytest.mark.parametrize("view", CAMERAS)
 def test_single_scattering(renderer, view, g):
-    """The renderer agrees with the marcher to 5e-4, and the marcher with itself at half the steps to 2e-3."""
+    """The renderer agrees with the marcher to 5e-4, and the marcher with itself at half the steps
+    to 2e-3.
+    """
     camera, params = CAMERAS[view], lit_params(**{"light.g": g})
     directions = twin.pixel_directions(camera, 8, 4).reshape(-1, 3)
     time = twin.cloudy_time(renderer(), params, camera, 0.05, 0.8)
     layers = renderer(8, 4, twin.fine(230, 128)).render_layers(camera, params, time=time)
     expected = twin.single_scattering(renderer(), params, camera.eye, directions, 400, 200, time)
-    np.testing.assert_allclose(layers["radiance"].reshape(-1, 3), expected, rtol=2e-3, atol=1e-3 * expected.mean())
+    np.testing.assert_allclose(
+        layers["radiance"].reshape(-1, 3), expected, rtol=2e-3, atol=1e-3 * expected.mean()
+    )
 
 
 @pytest.mark.parametrize("elevation", [50.0, 12.0, -0.5])
 def test_sun_transmittance(renderer, rng, elevation):
-    """On the ground, in the clouds, above them; under the evening sun a ray can leave the shell and come back."""
+    """On the ground, in the clouds, above them; under the evening sun a ray can leave the shell
+    and come back.
+    """
     params = lit_params(**{"sun.elevation": elevation, "clouds.extinction": 4e-4})
     points = np.zeros((300, 3))
     points[:, :2] = rng.uniform(-10_000, 10_000, (300, 2))
@@ -69,26 +78,42 @@ def test_the_ground_hides_the_sun(renderer):
 
 
 def test_high_clouds_shade(renderer, rng):
-    """A layer without thickness: its optical depth over the sine of the sun's height, no more than its greatest."""
+    """A layer without thickness: its optical depth over the sine of the sun's height, no more
+    than its greatest.
+    """
     params = lit_params(
-        **{"clouds.coverage": 0.0, "high_clouds.coverage": 1.0, "high_clouds.optical_depth": 0.8, "sun.elevation": 30.0}
+        **{
+            "clouds.coverage": 0.0,
+            "high_clouds.coverage": 1.0,
+            "high_clouds.optical_depth": 0.8,
+            "sun.elevation": 30.0,
+        }
     )
     points = rng.uniform(-20_000, 20_000, (200, 3)) * [1, 1, 0]
     shade = -np.log(renderer().sun_transmittance(points, params))
     assert 0.1 < shade.max() <= 0.8 / np.sin(np.radians(30)) * 1.01
-    twice = -np.log(renderer().sun_transmittance(points, params.with_(**{"high_clouds.optical_depth": 1.6})))
+    twice = -np.log(
+        renderer().sun_transmittance(points, params.with_(**{"high_clouds.optical_depth": 1.6}))
+    )
     np.testing.assert_allclose(twice, 2 * shade, rtol=1e-4, atol=1e-6)
-    above = points + [0, 0, params.high_clouds.altitude + 100]
+    above = points + np.array([0, 0, params.high_clouds.altitude + 100])
     assert (renderer().sun_transmittance(above, params) == 1).all()
 
 
 @pytest.mark.parametrize("model", MODELS)
 def test_radiance_follows_the_sun(renderer, model):
-    """Twice the irradiance is twice the light of every model: all of it comes from the sun. Without sun there is none."""
-    camera, params = CAMERAS["below"], lit_params(**{"light.model": model, "atmosphere.enabled": True})
+    """Twice the irradiance is twice the light of every model: all of it comes from the sun.
+    Without sun there is none.
+    """
+    camera, params = (
+        CAMERAS["below"],
+        lit_params(**{"light.model": model, "atmosphere.enabled": True}),
+    )
     make = renderer(32, 18)
     one = make.render_layers(camera, params)["radiance"]
-    two = make.render_layers(camera, params.with_(**{"sun.irradiance": (6.0, 4.0, 2.0)}))["radiance"]
+    two = make.render_layers(camera, params.with_(**{"sun.irradiance": (6.0, 4.0, 2.0)}))[
+        "radiance"
+    ]
     assert np.isfinite(one).all() and (one >= 0).all() and one.max() > 0
     np.testing.assert_allclose(two, 2 * one, rtol=1e-3, atol=1e-6)
     dark = make.render(camera, params.with_(**{"sun.irradiance": (0.0, 0.0, 0.0)}))
@@ -98,7 +123,8 @@ def test_radiance_follows_the_sun(renderer, model):
 def test_single_scattering_is_proportional_to_albedo(renderer):
     camera, params = CAMERAS["below"], lit_params()
     full, half = (
-        renderer(16, 9).render_layers(camera, params.with_(**{"light.albedo": a}))["radiance"] for a in (1.0, 0.5)
+        renderer(16, 9).render_layers(camera, params.with_(**{"light.albedo": a}))["radiance"]
+        for a in (1.0, 0.5)
     )
     np.testing.assert_allclose(half, 0.5 * full, rtol=1e-5)
 
@@ -140,7 +166,9 @@ def beer(model, d):
 @pytest.mark.parametrize("model", MODELS)
 @pytest.mark.parametrize("rain", [0.0, 1.0])
 def test_published_energy(model, rain):
-    """2 exp(-d p) (1 - exp(-2 d p)) without the phase function; single scattering is albedo times exp(-d)."""
+    """2 exp(-d p) (1 - exp(-2 d p)) without the phase function; single scattering is albedo times
+    exp(-d).
+    """
     got = energy(DEPTHS, rain, model=model, **PLAIN)
     d = DEPTHS.astype(np.float32).astype(np.float64)
     if model == "single":
@@ -162,7 +190,6 @@ def test_behind_more_cloud_it_is_not_brighter(model):
 
 @pytest.mark.parametrize("model", MODELS[1:])
 def test_rain_clouds_are_darker(model):
-    deep = DEPTHS[DEPTHS > 1 / nubis.Params().light.absorption]
+    deep = DEPTHS[1 / nubis.Params().light.absorption < DEPTHS]
     dry, wet = energy(deep, 0.0, model=model), energy(deep, 1.0, model=model)
     assert (wet <= dry).all() and (wet < dry).any()
-

@@ -1,10 +1,12 @@
-"""The march: transmittance against the integral of the renderer's own density, and what each layer of a picture means."""
+"""The march: transmittance against the integral of the renderer's own density, and what each
+layer of a picture means.
+"""
 
 import numpy as np
 import pytest
-import twin
 
 import nubis
+import twin
 
 EARTH = 6_371_000.0
 THESIS = 400_000.0
@@ -15,7 +17,8 @@ def looking(height, elevation, fov_y=3.0):
     return nubis.Camera.look_at(eye, eye + twin.compass(15, elevation), fov_y=fov_y)
 
 
-# Narrow views, as the level of detail grows with a pixel's width. On thesis2018's planet of 400 km the horizon is near.
+# Narrow views, as the level of detail grows with a pixel's width. On thesis2018's planet of 400 km
+# the horizon is near.
 VIEWS = {
     "below": (looking(100, 34), EARTH, 0.004),
     "zenith": (looking(100, 88), EARTH, 0.004),
@@ -42,7 +45,11 @@ def test_transmittance(renderer, view):
     camera, params = view_params(view)
     directions = twin.pixel_directions(camera, 16, 9).reshape(-1, 3)
     time = twin.cloudy_time(renderer(), params, camera, 0.05, 0.95)
-    got = renderer(16, 9, twin.fine(1024)).render_layers(camera, params, time=time)["transmittance"].ravel()
+    got = (
+        renderer(16, 9, twin.fine(1024))
+        .render_layers(camera, params, time=time)["transmittance"]
+        .ravel()
+    )
     expected = twin.transmittance(renderer(), params, camera.eye, directions, 8000, time)
     np.testing.assert_allclose(got, expected, atol=3e-4)
 
@@ -53,21 +60,36 @@ def test_more_steps_converge(renderer, view):
     camera, params = view_params(view)
     time = twin.cloudy_time(renderer(), params, camera, 0.05, 0.95)
     counts = (32, 64, 128, 1024)
-    layers = {n: renderer(16, 9, twin.fine(n)).render_layers(camera, params, time=time) for n in counts}
+    layers = {
+        n: renderer(16, 9, twin.fine(n)).render_layers(camera, params, time=time) for n in counts
+    }
     expected = layers.pop(1024)["transmittance"]
     error = [np.sqrt(np.mean((v["transmittance"] - expected) ** 2)) for v in layers.values()]
     assert error[1] < error[0] / 3 and error[2] < error[1] / 3
 
 
-BOUNDS = {"draft": 0.06, "balanced": 0.03, "high": 0.01, "nubis2015": 0.06, "thesis2018": 0.06, "vsu2022": 0.03}
+BOUNDS = {
+    "draft": 0.06,
+    "balanced": 0.03,
+    "high": 0.01,
+    "nubis2015": 0.06,
+    "thesis2018": 0.06,
+    "vsu2022": 0.03,
+}
 
 
 @pytest.mark.parametrize("quality", BOUNDS)
 def test_methods_agree(renderer, quality):
-    """The method is no part of the look: every one is near a converged picture, the better ones nearer."""
+    """The method is no part of the look: every one is near a converged picture, the better ones
+    nearer.
+    """
     camera, params = nubis.scenes["fair_weather"]
-    best = nubis.quality("high").replace(steps_zenith=1000, steps_horizon=2000, min_transmittance=1e-4)
-    got, expected = (renderer(48, 27, q).render_layers(camera, params)["transmittance"] for q in (quality, best))
+    best = nubis.quality("high").replace(
+        steps_zenith=1000, steps_horizon=2000, min_transmittance=1e-4
+    )
+    got, expected = (
+        renderer(48, 27, q).render_layers(camera, params)["transmittance"] for q in (quality, best)
+    )
     assert np.sqrt(np.mean((got - expected) ** 2)) < BOUNDS[quality]
     assert abs(np.mean(got - expected)) < 0.2 * BOUNDS[quality]
 
@@ -89,11 +111,15 @@ def test_jitter_spreads_the_error_and_adds_none(renderer):
 
 
 def test_the_end_of_a_ray_is_not_lost(renderer):
-    """Ending at a transmittance of 0.1 scales away what is left: brightness stays within a few percent."""
+    """Ending at a transmittance of 0.1 scales away what is left: brightness stays within a few
+    percent.
+    """
     camera, params = view_params("above", **{"clouds.extinction": 0.05, "light.model": "single"})
     time = twin.cloudy_time(renderer(), params, camera, 0, 1e-3)
     to_the_end, cut = (
-        renderer(16, 9, twin.fine(512, 16, min_transmittance=m)).render_layers(camera, params, time=time)
+        renderer(16, 9, twin.fine(512, 16, min_transmittance=m)).render_layers(
+            camera, params, time=time
+        )
         for m in (0.0, 0.1)
     )
     opaque = to_the_end["transmittance"] < 1e-3
@@ -103,10 +129,13 @@ def test_the_end_of_a_ray_is_not_lost(renderer):
 
 
 def test_big_steps_find_the_same_clouds(renderer):
-    """A big step outside that hits cloud goes back: with few small clouds, only what it leaps over may be lost."""
+    """A big step outside that hits cloud goes back: with few small clouds, only what it leaps
+    over may be lost.
+    """
     camera, params = nubis.scenes["fair_weather"]
     small, big = (
-        renderer(32, 18, twin.fine(512, big_step=b, empty_samples=6)).render_layers(camera, params) for b in (1, 3)
+        renderer(32, 18, twin.fine(512, big_step=b, empty_samples=6)).render_layers(camera, params)
+        for b in (1, 3)
     )
     assert np.abs(small["transmittance"] - big["transmittance"]).mean() < 0.01
     assert big["samples"].sum() < small["samples"].sum()
@@ -115,7 +144,9 @@ def test_big_steps_find_the_same_clouds(renderer):
 @pytest.mark.parametrize("height", [2.0, 2000.0, 6000.0, 30_000.0])
 @pytest.mark.parametrize("radius", [EARTH, THESIS])
 def test_only_rays_that_meet_the_shell_are_marched(renderer, height, radius):
-    """No sample where the ray misses the shell, past the horizon or beside the planet; some everywhere else."""
+    """No sample where the ray misses the shell, past the horizon or beside the planet; some
+    everywhere else.
+    """
     params = twin.smooth_params(**{"atmosphere.planet_radius": radius})
     camera = looking(height, -5, 60)
     directions = twin.pixel_directions(camera, 64, 64).reshape(-1, 3)
@@ -186,7 +217,9 @@ def test_layers_belong_together(renderer, scene):
 
 
 def test_depth_is_where_the_cloud_is(renderer):
-    """Between entering and leaving the shell; on average nearly where float64 finds the scattered light to come from."""
+    """Between entering and leaving the shell; on average nearly where float64 finds the scattered
+    light to come from.
+    """
     camera, params = view_params("below")
     directions = twin.pixel_directions(camera, 16, 9).reshape(-1, 3)
     time = twin.cloudy_time(renderer(), params, camera, 0.05, 0.8)
@@ -201,7 +234,9 @@ def test_depth_is_where_the_cloud_is(renderer):
 
 
 def test_a_wide_view_is_made_of_narrow_ones(renderer):
-    """The middle rows of a picture are the picture of a smaller angle: no row knows of the others."""
+    """The middle rows of a picture are the picture of a smaller angle: no row knows of the
+    others.
+    """
     params = nubis.Params().with_(**{"clouds.coverage": 0.6})
     method = nubis.quality("draft").replace(jitter=False)
     whole = renderer(40, 72, method).render(looking(200, 15, 60), params)
@@ -212,7 +247,9 @@ def test_a_wide_view_is_made_of_narrow_ones(renderer):
 
 
 def test_bands_do_not_show(renderer):
-    """A picture comes in bands as long as time allows: a new renderer, one used to light work and one to hard work agree."""
+    """A picture comes in bands as long as time allows: a new renderer, one used to light work and
+    one to hard work agree.
+    """
     size = 128, 256
     camera, params = looking(200, 10, 70), nubis.Params().with_(**{"clouds.coverage": 0.6})
     hard = params.with_(**{"clouds.extinction": 1e-4, "clouds.coverage": 1.0})
@@ -245,8 +282,12 @@ HEIGHTS = [-5.0, 0.01, 1199.99, 1200.01, 3199.99, 3200.01, 20_000.0, 400_000.0, 
 
 @pytest.mark.parametrize("height", HEIGHTS)
 def test_anywhere(renderer, height):
-    """On the ground, a centimetre from each side of the shell, in orbit: finite and in range in all directions."""
-    params = nubis.Params().with_(**{"clouds.coverage": 0.6, "clouds.base": 1200.0, "clouds.top": 3200.0})
+    """On the ground, a centimetre from each side of the shell, in orbit: finite and in range in
+    all directions.
+    """
+    params = nubis.Params().with_(
+        **{"clouds.coverage": 0.6, "clouds.base": 1200.0, "clouds.top": 3200.0}
+    )
     layers = renderer(64, 32).render_layers(nubis.Camera.equirect((0, 0, height)), params)
     check_range(layers)
 
@@ -255,10 +296,14 @@ def test_anywhere(renderer, height):
 @pytest.mark.parametrize("elevation", [-20.0, -0.2, 0.0, 0.2, 20.0])
 def test_crossing_a_boundary_shows_nothing(renderer, shell, elevation):
     """A centimetre more of height changes hardly a pixel."""
-    params = nubis.Params().with_(**{"clouds.coverage": 0.9, "clouds.base": 1200.0, "clouds.top": 3200.0})
+    params = nubis.Params().with_(
+        **{"clouds.coverage": 0.9, "clouds.base": 1200.0, "clouds.top": 3200.0}
+    )
     method = nubis.quality("high").replace(jitter=False)
     under, over = (
-        renderer(16, 9, method).render_layers(looking(shell + dz, elevation, 4), params)["transmittance"]
+        renderer(16, 9, method).render_layers(looking(shell + dz, elevation, 4), params)[
+            "transmittance"
+        ]
         for dz in (-0.01, 0.01)
     )
     assert np.abs(under - over).mean() < 0.01
@@ -285,11 +330,15 @@ STRESS = [
 ]
 
 
-@pytest.mark.parametrize("changes", STRESS, ids=lambda changes: ", ".join(f"{k}={v:g}" for k, v in changes.items()))
+@pytest.mark.parametrize(
+    "changes", STRESS, ids=lambda changes: ", ".join(f"{k}={v:g}" for k, v in changes.items())
+)
 @pytest.mark.parametrize("model", ["single", "thesis2018"])
 def test_extreme_parameters(renderer, changes, model):
     camera, params = nubis.scenes["fair_weather"]
-    check_range(renderer(32, 18).render_layers(camera, params.with_(**{"light.model": model, **changes})))
+    check_range(
+        renderer(32, 18).render_layers(camera, params.with_(**{"light.model": model, **changes}))
+    )
 
 
 @pytest.mark.parametrize("time", [-1e6, 86_400.0, 2.6e6, 1e12])

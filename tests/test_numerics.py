@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-import twin
 
 import nubis
+import twin
 from nubis.testing import probe
 
 EARTH = 6_371_000.0
@@ -42,7 +42,9 @@ def test_remap_is_clamped_and_finite():
 def test_altitude(radius):
     """Subtracting the radius from a length is 0.8 m off at 100 km on Earth."""
     level = np.logspace(0, 5, 60)
-    points = np.concatenate([[x * twin.compass(200, e) for x in level] for e in (-1, 0, 0.5, 5, 40, 90)])
+    points = np.concatenate(
+        [[x * twin.compass(200, e) for x in level] for e in (-1, 0, 0.5, 5, 40, 90)]
+    )
     params = nubis.Params().with_(**{"atmosphere.planet_radius": radius})
     got = probe("altitude_at(x.xyz)", points, imports=["shell"], params=params)[:, 0]
     expected = twin.altitude(f32(points), radius)
@@ -54,17 +56,20 @@ def test_cosine_to_the_local_zenith(rng):
     direction = twin.compass(130, 10)
     wgsl = "cos_zenith_at(x.xyz, vec3f({}, {}, {}))".format(*direction)
     got = probe(wgsl, points, imports=["shell"])[:, 0]
-    expected = twin.normalized(points + [0, 0, EARTH]) @ direction
+    expected = twin.normalized(twin.from_centre(points, EARTH)) @ direction
     np.testing.assert_allclose(got, expected, atol=3e-7)
 
 
 @pytest.mark.parametrize("height", [0.01, 1.0, 1500.0, 4000.0])
 def test_distance_to_a_shell_from_the_ground(height):
-    """Grazing to zenith, from 1 cm under the shell to 4 km. The plain quadratic is 11 m off at 1.5 km."""
+    """Grazing to zenith, from 1 cm under the shell to 4 km. The plain quadratic is 11 m off at
+    1.5 km.
+    """
     elevations = [0, 0.01, 0.1, 1, 5, 20, 45, 80, 90]
     directions = f32([twin.compass(30, e) for e in elevations])
     params = nubis.Params().with_(**{"clouds.base": height, "clouds.top": height + 1000})
-    wgsl = "vec4f(hit_sphere(x.xyz, frame.power_base).near, hit_sphere(x.xyz, frame.power_base).far, 0.0, 0.0)"
+    hit = "hit_sphere(x.xyz, frame.power_base)"
+    wgsl = f"vec4f({hit}.near, {hit}.far, 0.0, 0.0)"
     near, far = probe(wgsl, directions, imports=["shell"], params=params)[:, :2].T
     expected = twin.sphere_hits((0, 0, 0), twin.normalized(directions), EARTH, height)[1]
     assert (near == 0).all()
@@ -72,14 +77,22 @@ def test_distance_to_a_shell_from_the_ground(height):
 
 
 def test_crossings_from_below_inside_and_above():
-    """Relative to what the given numbers mean: near a tangent point, rounding moves the crossings apart or merges them."""
-    h, height = np.meshgrid([0.0, 2.0, 1499.99, 1500.01, 3000.0, 20_000.0, 400_000.0], [0.0, 1500.0, 4000.0])
+    """Relative to what the given numbers mean: near a tangent point, rounding moves the crossings
+    apart or merges them.
+    """
+    h, height = np.meshgrid(
+        [0.0, 2.0, 1499.99, 1500.01, 3000.0, 20_000.0, 400_000.0], [0.0, 1500.0, 4000.0]
+    )
     h, height = (v.ravel()[:, None] for v in (h, height))
     mu = np.sin(np.radians([-90, -45, -20, -10, -3, -1, -0.1, 0, 0.1, 3, 45, 90]))
     b = f32((EARTH + h) * mu + 0 * height)
     power = f32((h - height) * (2 * EARTH + h + height) + 0 * mu)
-    wgsl = "vec4f(crossing(x.x, x.y).near, crossing(x.x, x.y).far, f32(crossing(x.x, x.y).hit), 0.0)"
-    near, far, hit = probe(wgsl, np.stack([b.ravel(), power.ravel()], 1), imports=["shell"])[:, :3].T
+    wgsl = (
+        "vec4f(crossing(x.x, x.y).near, crossing(x.x, x.y).far, f32(crossing(x.x, x.y).hit), 0.0)"
+    )
+    near, far, hit = probe(wgsl, np.stack([b.ravel(), power.ravel()], 1), imports=["shell"])[
+        :, :3
+    ].T
     b, power = b.ravel(), power.ravel()
 
     disc = b.astype(np.longdouble) ** 2 - power
@@ -93,7 +106,8 @@ def test_crossings_from_below_inside_and_above():
     tolerance = np.where(power <= 0, 2e-6 * np.abs(-b + root), tolerance)
     expected_near = np.where(power > 0, -b - root, 0)
     tolerance_near = np.where(power <= 0, 0, tolerance)
-    # The far crossing from below or inside is -power / (b + root), without a difference of large numbers.
+    # The far crossing from below or inside is -power / (b + root), without a difference of large
+    # numbers.
     expected_far = np.where(b > 0, -power / np.maximum(b + root, 1), -b + root)
     assert (np.abs(near - expected_near) <= tolerance_near)[sure].all()
     assert (np.abs(far - expected_far) <= np.maximum(tolerance, 1e-30))[sure].all()
@@ -118,9 +132,11 @@ STRETCHES = {
 
 @pytest.mark.parametrize("case", STRETCHES)
 def test_stretches_of_a_ray_inside_the_shell(case):
-    """Only the total length behind the ground is free: a stretch of no length may start anywhere."""
+    """A stretch of no length may start anywhere."""
     *hits, (start, first, gap, second) = STRETCHES[case]
-    top, base, ground = (f"Hit({near:.1f}, {far:.1f}, {'true' if hit else 'false'})" for near, far, hit in hits)
+    top, base, ground = (
+        f"Hit({near:.1f}, {far:.1f}, {'true' if hit else 'false'})" for near, far, hit in hits
+    )
     call = f"stretches_between({top}, {base}, {ground})"
     wgsl = f"vec4f({call}.start, {call}.first, {call}.gap, {call}.second)"
     got = probe(wgsl, [0.0], imports=["shell"])[0]
@@ -147,10 +163,18 @@ def pcg3d(v):
 
 
 def lattice(period, salt):
-    """The random3 of every cell of a lattice, shape (period, period, period, 3), indexed [x, y, z]."""
+    """The random3 of every cell of a lattice, shape (period, period, period, 3), indexed [x, y,
+    z].
+    """
     cells = np.indices((period,) * 3).astype(np.uint32)
     salts = [np.uint32(salt * k % 2**32) for k in (747796405, 2891336453, 277803737)]
-    return np.stack([(c >> np.uint32(8)) / 2**24 for c in pcg3d([c + s for c, s in zip(cells, salts, strict=True)])], -1)
+    return np.stack(
+        [
+            (c >> np.uint32(8)) / 2**24
+            for c in pcg3d([c + s for c, s in zip(cells, salts, strict=True)])
+        ],
+        -1,
+    )
 
 
 def test_random_numbers_are_those_of_the_paper():
@@ -161,7 +185,9 @@ def test_random_numbers_are_those_of_the_paper():
 
 @pytest.mark.parametrize("salt", [0, 1, 977])
 def test_random_numbers_are_uniform(salt):
-    """Each component, and neighbours and salts without correlation: 1/sqrt(n) is one standard deviation."""
+    """Each component, and neighbours and salts without correlation: 1/sqrt(n) is one standard
+    deviation.
+    """
     cells = np.indices((20, 20, 20)).reshape(3, -1).T
     n = len(cells)
     wgsl = f"vec4f(random3(vec3u(x.xyz), {salt}u), random3(vec3u(x.xyz), {salt + 1}u).x)"
@@ -180,8 +206,12 @@ def test_random_numbers_are_uniform(salt):
 
 
 def test_cells_wrap():
-    cells = np.array([[x, y, z, n] for n in (1, 3, 8) for x in range(-n, 2 * n) for y, z in [(x, 0), (-1, n)]])
-    got = probe("vec4f(vec3f(wrap_cell(vec3i(x.xyz), vec3i(i32(x.w)))), 0.0)", cells, imports=["random"])
+    cells = np.array(
+        [[x, y, z, n] for n in (1, 3, 8) for x in range(-n, 2 * n) for y, z in [(x, 0), (-1, n)]]
+    )
+    got = probe(
+        "vec4f(vec3f(wrap_cell(vec3i(x.xyz), vec3i(i32(x.w)))), 0.0)", cells, imports=["random"]
+    )
     np.testing.assert_array_equal(got[:, :3], np.mod(cells[:, :3], cells[:, 3:]))
 
 
@@ -214,7 +244,9 @@ def test_worley_against_all_feature_points(rng):
     """Its 27 cells find the nearest of all points of the tile and of the tiles around it."""
     period, salt = 3, 5
     p = f32(rng.uniform(0, 1, (300, 3)))
-    points = (np.indices((period,) * 3).transpose(1, 2, 3, 0) + lattice(period, salt)).reshape(-1, 3)
+    points = (np.indices((period,) * 3).transpose(1, 2, 3, 0) + lattice(period, salt)).reshape(
+        -1, 3
+    )
     apart = np.abs(p[:, None] * period - points)
     apart = np.minimum(apart, period - apart)
     nearest = np.linalg.norm(apart, axis=2).min(axis=1)
@@ -224,12 +256,16 @@ def test_worley_against_all_feature_points(rng):
 
 def test_perlin_is_zero_on_its_lattice():
     cells = np.indices((4, 4, 4)).reshape(3, -1).T / 4
-    assert np.abs(probe("perlin(x.xyz, 4u, 3u)", cells, imports=["gradient_noise"])[:, 0]).max() < 1e-6
+    assert (
+        np.abs(probe("perlin(x.xyz, 4u, 3u)", cells, imports=["gradient_noise"])[:, 0]).max() < 1e-6
+    )
 
 
 @pytest.mark.parametrize("scale_height", [1200.0, 8000.0])
 def test_air_along_slanted_rays(scale_height):
-    """Chapman's function, by quadrature; its approximation is good to 1 % and finite through the ground."""
+    """Chapman's function, by quadrature; its approximation is good to 1 % and finite through the
+    ground.
+    """
     h = np.array([0.0, 100.0, 5000.0, 60_000.0])
     mu = np.sin(np.radians([-1, 0, 0.5, 2, 10, 45, 90]))
     h, mu = (v.ravel() for v in np.meshgrid(h, mu))

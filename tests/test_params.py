@@ -1,4 +1,6 @@
-"""Parameters: values that are checked when they are made, compare and hash as wholes, and survive files."""
+"""Parameters: values that are checked when they are made, compare and hash as wholes, and survive
+files.
+"""
 
 import copy
 import dataclasses
@@ -14,14 +16,22 @@ import nubis
 import nubis.params
 from nubis import ParameterError, Params, Quality
 
-GROUPS = {f.name: type(getattr(Params(), f.name)) for f in dataclasses.fields(Params) if getattr(Params(), f.name)}
+GROUPS = {
+    f.name: type(getattr(Params(), f.name))
+    for f in dataclasses.fields(Params)
+    if getattr(Params(), f.name)
+}
 CLASSES = {**GROUPS, "quality": Quality}
-FIELDS = [(group, field.name) for group, cls in CLASSES.items() for field in dataclasses.fields(cls)]
+FIELDS = [
+    (group, field.name) for group, cls in CLASSES.items() for field in dataclasses.fields(cls)
+]
 NAN, INF = float("nan"), float("inf")
 
 
 def allowed(group, name):
-    """What the documentation of a field says is allowed: its words, and the range that they name if they do."""
+    """What the documentation of a field says is allowed: its words, and the range that they name
+    if they do.
+    """
     doc = " ".join(CLASSES[group].__doc__.split())
     words = re.search(rf" {name} : .*? Allowed: (.*?)\.(?: \w+ : |$)", doc)[1]
     numbers = re.search(r"from (-?[\d.]+) to (-?[\d.]+)", words)
@@ -53,7 +63,9 @@ def refused(group, name, value):
 
 def filled(hint, value):
     """The value in the shape of a field: as it is, or once for each component."""
-    return tuple(value for _ in typing.get_args(hint)) if typing.get_origin(hint) is tuple else value
+    return (
+        tuple(value for _ in typing.get_args(hint)) if typing.get_origin(hint) is tuple else value
+    )
 
 
 NUMERIC = [f for f in FIELDS if kind(*f) in (int, float) or typing.get_origin(kind(*f)) is tuple]
@@ -72,10 +84,15 @@ def test_range(group, name):
     if hint is int:
         inside, outside = (int(low), int(high)), (int(low) - 1, int(high) + 1)
     else:
-        inside, outside = (low, high), (math.nextafter(low, -INF), math.nextafter(high, INF), low - 1, high + 1e3)
+        inside, outside = (
+            (low, high),
+            (math.nextafter(low, -INF), math.nextafter(high, INF), low - 1, high + 1e3),
+        )
     for value in inside:
         try:
-            assert getattr(make(group, name, filled(hint, value)), name) == pytest.approx(filled(hint, value), rel=1e-6)
+            assert getattr(make(group, name, filled(hint, value)), name) == pytest.approx(
+                filled(hint, value), rel=1e-6
+            )
         except ParameterError as error:
             # What no single field can say is about two of them.
             assert str(error).startswith("quality.") and "times" in str(error)
@@ -144,7 +161,9 @@ def test_a_map_is_a_copy():
     np.testing.assert_array_equal(weather.map, MAP.astype(np.float32))
 
 
-@pytest.mark.parametrize("clone", [lambda v: v, copy.copy, copy.deepcopy, lambda v: pickle.loads(pickle.dumps(v))])
+@pytest.mark.parametrize(
+    "clone", [lambda v: v, copy.copy, copy.deepcopy, lambda v: pickle.loads(pickle.dumps(v))]
+)
 def test_a_map_is_read_only(clone):
     """Else a hash would change under a key."""
     weather = clone(nubis.Weather(map=MAP))
@@ -167,7 +186,19 @@ def test_a_map_is_read_only(clone):
         1.0,
         np.zeros((1, 8193, 3)),
     ],
-    ids=["flat", "two channels", "empty", "above 1", "below 0", "NaN", "text", "complex", "path", "number", "too wide"],
+    ids=[
+        "flat",
+        "two channels",
+        "empty",
+        "above 1",
+        "below 0",
+        "NaN",
+        "text",
+        "complex",
+        "path",
+        "number",
+        "too wide",
+    ],
 )
 def test_maps_that_are_none(bad):
     refused("weather", "map", bad)
@@ -175,7 +206,11 @@ def test_maps_that_are_none(bad):
 
 def test_frozen_and_keyword_only():
     params = Params()
-    for owner, name in ((params, "sun"), (params.sun, "elevation"), (nubis.quality("draft"), "jitter")):
+    for owner, name in (
+        (params, "sun"),
+        (params.sun, "elevation"),
+        (nubis.quality("draft"), "jitter"),
+    ):
         with pytest.raises(dataclasses.FrozenInstanceError):
             setattr(owner, name, getattr(owner, name))
     for cls in (*CLASSES.values(), Params):
@@ -201,13 +236,23 @@ def test_equality_sees_every_field(group, name):
         value = near if near <= high else first - (1 if hint is int else 1e-3)
         assert low <= value <= high
         other = filled(hint, value)
-    plain, changed, again = make(group, name, default), make(group, name, other), make(group, name, other)
-    assert plain == CLASSES[group]() and hash(plain) == hash(CLASSES[group]()) and plain is not CLASSES[group]()
+    plain, changed, again = (
+        make(group, name, default),
+        make(group, name, other),
+        make(group, name, other),
+    )
+    assert (
+        plain == CLASSES[group]()
+        and hash(plain) == hash(CLASSES[group]())
+        and plain is not CLASSES[group]()
+    )
     assert changed == again and hash(changed) == hash(again)
     assert changed != plain and hash(changed) != hash(plain)
     assert repr(changed) != repr(plain) and f"{name}=" in repr(changed)
     if group != "quality":
-        assert Params(**{group: changed}) == Params().with_(**{f"{group}.{name}": other}) != Params()
+        assert (
+            Params(**{group: changed}) == Params().with_(**{f"{group}.{name}": other}) != Params()
+        )
 
 
 def test_equality_with_other_things():
@@ -247,7 +292,11 @@ class TestCopies:
         values = params.to_dict()
         assert Params.from_dict(values) == params
         assert set(values) >= set(GROUPS)
-        assert all(isinstance(v, bool | int | float | str | list | None) for g in GROUPS for v in values[g].values())
+        assert all(
+            isinstance(v, bool | int | float | str | list | None)
+            for g in GROUPS
+            for v in values[g].values()
+        )
 
     def test_toml(self, params, tmp_path):
         path = tmp_path / "sky.toml"
@@ -321,7 +370,9 @@ def test_unknown_names_and_wrong_groups(change, named):
 
 @pytest.mark.parametrize("top", [1000.0, 999.0])
 def test_tops_are_above_bases(top):
-    with pytest.raises(ParameterError, match=re.escape(f"clouds.top = {top:.0f} is not allowed")) as error:
+    with pytest.raises(
+        ParameterError, match=re.escape(f"clouds.top = {top:.0f} is not allowed")
+    ) as error:
         Params().with_(**{"clouds.base": 1000.0, "clouds.top": top})
     assert "1000" in str(error.value).split("must be")[1]
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-import twin
 
 import nubis
+import twin
 from nubis.testing import probe
 
 G = [-0.9, -0.6, -0.25, 0.0, 0.25, 0.6, 0.9, 0.99, 0.999]
@@ -16,7 +16,9 @@ def shader_hg(one_minus_mu, g):
 
 
 def test_integral_and_mean_cosine():
-    """Over v = 1 - mu, in logarithmic steps from either end: at g = 0.999 the peak is a tenth of a degree wide."""
+    """Over v = 1 - mu, in logarithmic steps from either end: at g = 0.999 the peak is a tenth of
+    a degree wide.
+    """
     half = np.logspace(-10, 0, 4000, dtype=np.float32).astype(np.float64)
     v = np.concatenate([[0], half, 2 - half[-2::-1], [2]])
     p = shader_hg(v[None], np.array(G)[:, None]).reshape(len(G), -1)
@@ -27,7 +29,9 @@ def test_integral_and_mean_cosine():
 @pytest.mark.parametrize("g", [0.6, 0.99, 0.999, 0.9999])
 @pytest.mark.parametrize("sign", [1, -1])
 def test_peak(g, sign):
-    """Tiny angles from the forward (or, for negative g, backward) direction, at the very numbers that the shader gets."""
+    """Tiny angles from the forward (or, for negative g, backward) direction, at the very numbers
+    that the shader gets.
+    """
     angle = np.radians([0, 0.001, 0.01, 0.03, 0.1, 0.3, 1, 3, 10])
     v = 2 * np.sin(angle / 2) ** 2
     v = (v if sign > 0 else 2 - v).astype(np.float32).astype(np.longdouble)
@@ -36,7 +40,9 @@ def test_peak(g, sign):
 
 
 def test_cosine_without_cancellation():
-    """1 minus the cosine of unit vectors a hundredth of a degree apart and more; as 1 - dot it has no digit left."""
+    """1 minus the cosine of unit vectors a hundredth of a degree apart and more; as 1 - dot it
+    has no digit left.
+    """
     angle = np.radians(np.concatenate([np.logspace(-2, 2.2, 30), [180]]))
     toward = np.array([0.6, 0.0, 0.8])
     across = np.array([0.8, 0.0, -0.6])

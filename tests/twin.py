@@ -1,4 +1,6 @@
-"""What the renderer should find, in float64 and in the plainest way: no formula here is copied from a shader."""
+"""What the renderer should find, in float64 and in the plainest way: no formula here is copied
+from a shader.
+"""
 
 import math
 
@@ -22,9 +24,14 @@ def normalized(v):
     return v / np.linalg.norm(v, axis=-1, keepdims=True)
 
 
+def from_centre(points, radius, dtype=np.float64):
+    """Positions relative to the centre of the planet, which is under the origin."""
+    return np.asarray(points, dtype=dtype) + np.array([0, 0, radius], dtype=dtype)
+
+
 def altitude(points, radius):
     """Height above a sphere that touches the origin from below."""
-    return np.linalg.norm(np.asarray(points, dtype=np.float64) + [0, 0, radius], axis=-1) - radius
+    return np.linalg.norm(from_centre(points, radius), axis=-1) - radius
 
 
 def raised(points, radius, height):
@@ -41,7 +48,7 @@ def sphere_hits(starts, directions, radius, height):
 
     Long doubles, because the plain quadratic formula loses half of its digits.
     """
-    o = np.asarray(starts, dtype=np.longdouble) + np.array([0, 0, radius], dtype=np.longdouble)
+    o = from_centre(starts, radius, np.longdouble)
     b = (np.asarray(directions, dtype=np.longdouble) * o).sum(axis=-1)
     c = (o * o).sum(axis=-1) - (np.longdouble(radius) + height) ** 2
     with np.errstate(invalid="ignore"):
@@ -60,7 +67,9 @@ def pixel_directions(camera, width, height):
 
 
 def ray_ends(eye, directions, params):
-    """How far along each ray there can be cloud: to the ground, or to where the ray leaves the shell for good."""
+    """How far along each ray there can be cloud: to the ground, or to where the ray leaves the
+    shell for good.
+    """
     radius = params.atmosphere.planet_radius
     end = np.nan_to_num(sphere_hits(eye, directions, radius, params.clouds.top)[1]).clip(0)
     ground = sphere_hits(eye, directions, radius, 0.0)[0]
@@ -68,7 +77,7 @@ def ray_ends(eye, directions, params):
 
 
 def optical_depths(renderer, params, starts, directions, ends, n, time=0.0):
-    """Integral of the renderer's own density from each start to `ends`, by `n` midpoints, and what it is made of.
+    """The renderer's own density along rays from `starts` to `ends`, in `n` equal steps.
 
     Returns the optical depth of every step, and the points in their middles.
     """
@@ -81,13 +90,16 @@ def optical_depths(renderer, params, starts, directions, ends, n, time=0.0):
 def transmittance(renderer, params, eye, directions, n, time=0.0):
     starts = np.broadcast_to(np.asarray(eye, dtype=np.float64), directions.shape)
     ends = ray_ends(eye, directions, params)
-    return np.exp(-optical_depths(renderer, params, starts, directions, ends, n, time)[0].sum(axis=1))
+    return np.exp(
+        -optical_depths(renderer, params, starts, directions, ends, n, time)[0].sum(axis=1)
+    )
 
 
 def cloudy_time(renderer, params, camera, low, high):
     """A time at which the mean transmittance of a narrow view lies between `low` and `high`.
 
-    The wind brings cloud before every camera sooner or later, whatever the noises and profiles are tuned to.
+    The wind brings cloud before every camera sooner or later, whatever noises and profiles are
+    tuned to.
     """
     directions = pixel_directions(camera, 4, 3).reshape(-1, 3)
     for time in range(0, 20_000, 500):
@@ -99,9 +111,12 @@ def cloudy_time(renderer, params, camera, low, high):
 def sun_transmittance(renderer, params, points, n, time=0.0):
     """0 where the ground hides the sun."""
     sun, radius = sun_direction(params), params.atmosphere.planet_radius
-    # To the last way out of the shell; without one in front, there is nothing between the point and the sun.
+    # To the last way out of the shell; without one in front, there is nothing between the point and
+    # the sun.
     ends = np.nan_to_num(sphere_hits(points, sun, radius, params.clouds.top)[1]).clip(0)
-    depth = optical_depths(renderer, params, points, np.broadcast_to(sun, points.shape), ends, n, time)[0]
+    depth = optical_depths(
+        renderer, params, points, np.broadcast_to(sun, points.shape), ends, n, time
+    )[0]
     hidden = sphere_hits(points, sun, radius, 0.0)[0] > 0
     return np.where(hidden, 0, np.exp(-depth.sum(axis=1)))
 
@@ -139,8 +154,8 @@ def relative_rmse(image, reference):
 def smooth_params(**changes):
     """A field without detail smaller than hundreds of metres, in black air without high clouds.
 
-    Steps of tens of metres then resolve it, and the level of detail that the march takes for its step is the finest,
-    which is the one that `density` reads.
+    Steps of tens of metres then resolve it, and the level of detail that the march takes for its
+    step is the finest, which is the one that `density` reads.
     """
     values = {
         "clouds.coverage": 0.5,
@@ -162,7 +177,9 @@ def smooth_params(**changes):
 
 
 def fine(view_steps, light_steps=1, **changes):
-    """A numerical method without short cuts: equal steps, light samples with all detail, no end before the end."""
+    """A numerical method without short cuts: equal steps, light samples with all detail, no end
+    before the end.
+    """
     values = {
         "steps_zenith": view_steps,
         "steps_horizon": view_steps,

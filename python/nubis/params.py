@@ -330,10 +330,10 @@ class Quality(Block):
     steps_zenith: int = 80
     steps_horizon: int = 192
     step_growth: float = 1.0
-    big_step: int = 2
+    big_step: int = 3
     empty_samples: int = 6
-    light_steps: int = 6
-    light_distance: float = 700.0
+    light_steps: int = 8
+    light_distance: float = 2500.0
     far_sample: bool = True
     cheap_light: float = 0.3
     min_transmittance: float = 0.01

@@ -187,13 +187,13 @@ params! {
         /// How much steps grow with distance: 0 makes all of a ray's steps equal, 1 lets a step be a fixed share of its distance.
         step_growth: f32 = 1.0, in 0..=1 "";
         /// How many steps one step outside cloud is long; on a hit the march goes back.
-        big_step: u32 = 2, in 1..=16 "";
+        big_step: u32 = 3, in 1..=16 "";
         /// Full samples of zero in a row after which samples are cheap again (nubis2015: 6).
         empty_samples: u32 = 6, in 1..=4096 "";
         /// Light samples toward the sun, besides the far one.
-        light_steps: u32 = 6, in 1..=128 "";
+        light_steps: u32 = 8, in 1..=128 "";
         /// How far the light samples reach; the far sample stands for as much as four times that, beyond.
-        light_distance: f32 = 700.0, in 1..=100000 "m";
+        light_distance: f32 = 2500.0, in 1..=100000 "m";
         /// Whether there is a far light sample, for shadows from distant clouds.
         far_sample: bool = true;
         /// Opacity in front of a sample past which its light samples leave out the detail (nubis2015: 0.3).
@@ -267,22 +267,25 @@ impl Quality {
     /// The method called `name`.
     pub fn named(name: &str) -> Result<Self> {
         let balanced = Self::default();
-        // The published marches: equal steps, no cut before the end of the shell but at alpha 0.99.
+        // The published marches: equal steps, light samples near by.
         let published = Self {
             steps_zenith: 64,
             steps_horizon: 128,
             step_growth: 0.0,
             big_step: 1,
             light_steps: 5,
+            light_distance: 700.0,
             ..balanced.clone()
         };
         Ok(match name {
             "balanced" => balanced,
-            "draft" => Self { steps_zenith: 40, steps_horizon: 96, light_steps: 4, ..balanced },
+            "draft" => Self { steps_zenith: 40, steps_horizon: 96, light_steps: 5, cheap_light: 0.0, ..balanced },
             "high" => Self {
                 steps_zenith: 192,
                 steps_horizon: 512,
-                light_steps: 12,
+                light_steps: 16,
+                light_distance: 6000.0,
+                far_sample: false,
                 cheap_light: 1.0,
                 min_transmittance: 0.002,
                 ..balanced

@@ -85,7 +85,7 @@ def test_methods_agree(renderer, quality):
     """
     camera, params = nubis.scenes["fair_weather"]
     best = nubis.quality("high").replace(
-        steps_zenith=1000, steps_horizon=2000, min_transmittance=1e-4
+        steps_zenith=1000, steps_horizon=2000, light_steps=1, min_transmittance=1e-4
     )
     got, expected = (
         renderer(48, 27, q).render_layers(camera, params)["transmittance"] for q in (quality, best)

@@ -54,8 +54,8 @@ def _make() -> dict[str, tuple[Camera, Params]]:
             fair.with_(**{"sun.elevation": 3.0, "sun.azimuth": 258.0}),
         ),
         "in_cloud": (
-            _look((0, 0, 1800), 200, 6),
-            fair.with_(**{"clouds.coverage": 0.5, "sun.azimuth": 230.0}),
+            _look((0, 0, 2000), 20, 4),
+            fair.with_(**{"clouds.coverage": 0.5}),
         ),
         "above": (
             _look((0, 0, 3500), 20, -10),

@@ -311,12 +311,14 @@ impl Quality {
     pub fn check(&self) -> Result<()> {
         check_block("quality", self)?;
         // lavapipe ends loops without a word after 65,535 iterations summed over a shader (docs/numerics.md).
-        let samples = self.steps_zenith.max(self.steps_horizon) * (2 + self.light_steps);
-        if samples > 30_000 {
+        // Growing steps may be twice as many (passes/march.wgsl).
+        let steps = self.steps_zenith.max(self.steps_horizon) * if self.step_growth > 0.0 { 2 } else { 1 };
+        let samples = steps * (2 + self.light_steps);
+        if samples > 40_000 {
             return Err(Error::parameter(
                 "quality.light_steps",
                 self.light_steps,
-                format!("so small that view steps times (2 + light steps), here {samples}, is at most 30000"),
+                format!("so small that view steps times (2 + light steps), here {samples}, is at most 40000"),
             ));
         }
         Ok(())

@@ -52,7 +52,11 @@ fn ray_steps(start: f32, length: f32, direction: vec3f) -> Steps {
     // near the eye (10 m, where 1 km would give 25 and show them as grain), rays that start far away nearly equal ones.
     var growth = quality.step_growth / (start + 300.0);
     growth = select(growth, 0.0, growth * length < 1e-3);
-    return Steps(u32(round(count)), length, growth, log2(1.0 + growth * length) / round(count));
+    // A ray from inside the clouds, or from just above them, has to cover many more distances than one from the ground:
+    // it gets up to twice the steps, or its far clouds are grain.
+    let reach = log(1.0 + growth * length);
+    let steps = round(count * clamp(sqrt(reach), 1.0, 2.0));
+    return Steps(u32(steps), length, growth, reach / log(2.0) / steps);
 }
 
 // Distance from the start of the march to a step boundary.

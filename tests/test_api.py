@@ -302,8 +302,8 @@ def test_forked_children(before, inside, code):
 LONG = """
 import sys, nubis
 camera, params = nubis.scenes["fair_weather"]
-nubis.Renderer(8, 8, quality="high").render(camera, params)
-renderer = nubis.Renderer(8192, 8192, quality="high")
+nubis.Renderer(8, 8, quality="draft").render(camera, params)
+renderer = nubis.Renderer(8192, 8192, quality="draft")
 print("ready", flush=True)
 try:
     renderer.render(camera, params)
@@ -319,6 +319,8 @@ def test_ctrl_c_stops_a_long_render():
     still be used.
     """
     program = subprocess.Popen([sys.executable, "-c", LONG], stdout=subprocess.PIPE, text=True)
+    watchdog = threading.Timer(120, program.kill)
+    watchdog.start()
     try:
         assert program.stdout.readline() == "ready\n"
         time.sleep(1)
@@ -330,8 +332,9 @@ def test_ctrl_c_stops_a_long_render():
         out, _ = program.communicate(timeout=60)
         assert out == "works\n" and program.returncode == 0
     finally:
+        watchdog.cancel()
         program.kill()
-        program.wait()
+        program.communicate()
 
 
 WARNINGS = """

@@ -104,10 +104,10 @@ def test_jitter_spreads_the_error_and_adds_none(renderer):
     )
     assert not np.array_equal(straight, jittered)
     assert abs(np.mean(jittered - exact)) < 2e-3
-    # Blue noise: neighbours err to different sides.
+    # Blue noise: neighbours err to different sides, across and down.
     error = jittered - exact
-    smooth = error.reshape(9, 4, 16, 4).mean(axis=(1, 3))
-    assert smooth.std() < 0.4 * error.std()
+    assert np.corrcoef(error[:, 1:].ravel(), error[:, :-1].ravel())[0, 1] < 0.1
+    assert np.corrcoef(error[1:].ravel(), error[:-1].ravel())[0, 1] < 0.1
 
 
 def test_the_end_of_a_ray_is_not_lost(renderer):
@@ -129,16 +129,18 @@ def test_the_end_of_a_ray_is_not_lost(renderer):
 
 
 def test_big_steps_find_the_same_clouds(renderer):
-    """A big step outside that hits cloud goes back: with few small clouds, only what it leaps
-    over may be lost.
+    """A big step that hits cloud goes back to take the small ones: only a cloud that fits between
+    two big steps can be lost.
     """
     camera, params = nubis.scenes["fair_weather"]
     small, big = (
-        renderer(32, 18, twin.fine(512, big_step=b, empty_samples=6)).render_layers(camera, params)
-        for b in (1, 3)
+        renderer(48, 27, twin.fine(128, big_step=b, empty_samples=6)).render_layers(camera, params)
+        for b in (1, 4)
     )
-    assert np.abs(small["transmittance"] - big["transmittance"]).mean() < 0.01
-    assert big["samples"].sum() < small["samples"].sum()
+    assert (small["transmittance"] < 0.9).any()
+    assert (small["transmittance"] != big["transmittance"]).mean() < 0.01
+    assert np.abs(small["transmittance"] - big["transmittance"]).mean() < 5e-4
+    assert big["samples"].sum() < 0.7 * small["samples"].sum()
 
 
 @pytest.mark.parametrize("height", [2.0, 2000.0, 6000.0, 30_000.0])
@@ -251,7 +253,7 @@ def test_bands_do_not_show(renderer):
     one to hard work agree.
     """
     size = 128, 256
-    camera, params = looking(200, 10, 70), nubis.Params().with_(**{"clouds.coverage": 0.6})
+    camera, params = looking(200, 40, 70), nubis.Params().with_(**{"clouds.coverage": 0.6})
     hard = params.with_(**{"clouds.extinction": 1e-4, "clouds.coverage": 1.0})
     pictures = []
     for warm_up in ([], [params.with_(**{"clouds.coverage": 0.0})] * 3, [hard]):

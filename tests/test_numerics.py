@@ -135,7 +135,8 @@ def test_stretches_of_a_ray_inside_the_shell(case):
     """A stretch of no length may start anywhere."""
     *hits, (start, first, gap, second) = STRETCHES[case]
     top, base, ground = (
-        f"Hit({near:.1f}, {far:.1f}, {'true' if hit else 'false'})" for near, far, hit in hits
+        f"Hit({near:.1f}, {far:.1f}, {str(hit > 0).lower()}, {str(near > 0).lower()})"
+        for near, far, hit in hits
     )
     call = f"stretches_between({top}, {base}, {ground})"
     wgsl = f"vec4f({call}.start, {call}.first, {call}.gap, {call}.second)"

@@ -33,6 +33,13 @@ class Base:
         values = (getattr(self, f.name) for f in dataclasses.fields(self))
         return tuple((v.shape, v.tobytes()) if isinstance(v, np.ndarray) else v for v in values)
 
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        # Copies and pickles of arrays come writeable.
+        for value in state.values():
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
+        self.__dict__.update(state)
+
     def __eq__(self, other: object) -> bool:
         if type(other) is not type(self):
             return NotImplemented

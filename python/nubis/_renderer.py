@@ -161,7 +161,8 @@ class Renderer:
         DeviceError
             When the device is lost or out of memory.
         """
-        self._check(camera, params)
+        _check_camera(camera)
+        _check_params(params)
         frame: Frame = self._core.render(camera, params, _time(time), _sky(background))
         return frame
 
@@ -181,7 +182,8 @@ class Renderer:
             - ``samples`` uint32 (height, width): density evaluations, primary and light together.
             - ``sky`` float32 (height, width, 3): radiance of the sky without clouds.
         """
-        self._check(camera, params)
+        _check_camera(camera)
+        _check_params(params)
         image, sky, depth, samples = self._core.render_layers(camera, params, _time(time))
         depth[depth < 0] = np.inf
         return {
@@ -225,7 +227,8 @@ class Renderer:
                 raise ParameterError(
                     f"shot = {shot!r} is not allowed: it must be (camera, params, time)"
                 ) from None
-            self._check(camera, params)
+            _check_camera(camera)
+            _check_params(params)
             yield self._core.animate(camera, params, _time(time), sky)
 
     def density(
@@ -243,7 +246,7 @@ class Renderer:
         extinction : array of float32, shape (N,)
             In 1/m.
         """
-        self._check(None, params)
+        _check_params(params)
         return self._core.density(points, params, _time(time))
 
     def sun_transmittance(
@@ -261,22 +264,25 @@ class Renderer:
         transmittance : array of float32, shape (N,)
             0 to 1; 0 where the ground hides the sun.
         """
-        self._check(None, params)
+        _check_params(params)
         return self._core.sun_transmittance(points, params, _time(time))
 
     def __repr__(self) -> str:
         width, height = self._size
         return f"Renderer({width}, {height}, adapter={self.adapter.name!r})"
 
-    @staticmethod
-    def _check(camera: Camera | None, params: Params) -> None:
-        if camera is not None and not isinstance(camera, Camera):
-            raise ParameterError(f"camera = {camera!r} is not allowed: it must be a nubis.Camera")
-        if not isinstance(params, Params):
-            raise ParameterError(f"params = {params!r} is not allowed: it must be a nubis.Params")
-
 
 _named = quality
+
+
+def _check_camera(camera: Any) -> None:
+    if not isinstance(camera, Camera):
+        raise ParameterError(f"camera = {camera!r} is not allowed: it must be a nubis.Camera")
+
+
+def _check_params(params: Any) -> None:
+    if not isinstance(params, Params):
+        raise ParameterError(f"params = {params!r} is not allowed: it must be a nubis.Params")
 
 
 def _size(name: str, value: Any) -> int:

@@ -5,7 +5,10 @@
 // direction it is scattered to. Both come in this form because 1 + g^2 - 2 g mu loses 8 % in f32 at g = 0.999 and
 // turns negative, hence NaN, from g = 0.9997 (hazard 5).
 fn henyey_greenstein(one_minus_mu: f32, g: f32) -> f32 {
-    let den = max((1.0 - g) * (1.0 - g) + 2.0 * g * one_minus_mu, 1e-12);
+    // A backward lobe peaks where 1 + cos is small; near 2, the difference to 2 is exact.
+    let from_peak = select(one_minus_mu, 2.0 - one_minus_mu, g < 0.0);
+    let a = abs(g);
+    let den = (1.0 - a) * (1.0 - a) + 2.0 * a * from_peak;
     return (1.0 - g) * (1.0 + g) / (4.0 * PI * den * sqrt(den));
 }
 

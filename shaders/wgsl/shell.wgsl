@@ -9,6 +9,7 @@ struct Hit {
     near: f32, // distance to the first crossing in front of the camera, 0 from inside
     far: f32, // distance to the last one
     hit: bool, // whether there is any
+    enters: bool, // whether the ray comes from outside, or from the surface, and goes in
 }
 
 // Where a ray from a point crosses a sphere: `b` is the point's distance to the planet's centre times the cosine
@@ -16,12 +17,12 @@ struct Hit {
 fn crossing(b: f32, power: f32) -> Hit {
     let disc = b * b - power;
     if disc < 0.0 || (power > 0.0 && b > 0.0) {
-        return Hit(0.0, 0.0, false);
+        return Hit(0.0, 0.0, false, false);
     }
     let s = sqrt(disc);
     let far = select(s - b, -power / (b + s), b > 0.0);
     let near = select(0.0, power / (s - b), power > 0.0);
-    return Hit(max(near, 0.0), max(far, 0.0), true);
+    return Hit(max(near, 0.0), max(far, 0.0), true, power >= 0.0 && b < 0.0);
 }
 
 // Where a ray from the camera crosses the sphere whose power is `power`.
@@ -64,7 +65,7 @@ fn stretches_between(outer: Hit, inner: Hit, ground: Hit) -> Stretches {
         return Stretches(0.0, 0.0, 0.0, 0.0);
     }
     // Below the surface (a camera under z = 0) the ground does not hide anything.
-    let end = select(outer.far, min(outer.far, ground.near), ground.hit && ground.near > 0.0);
+    let end = select(outer.far, min(outer.far, ground.near), ground.enters);
     if !inner.hit || inner.near >= end {
         return Stretches(outer.near, max(end - outer.near, 0.0), 0.0, 0.0);
     }

@@ -50,7 +50,8 @@ fn aces(v: Rgb) -> Rgb {
     const OUTPUT: [[f32; 3]; 3] =
         [[1.604_75, -0.531_08, -0.073_67], [-0.102_08, 1.108_13, -0.006_05], [-0.003_27, -0.072_76, 1.076_02]];
     let fit = |v: f32| (v * (v + 0.024_578_6) - 0.000_090_537) / (v * (0.983_729 * v + 0.432_951) + 0.238_081);
-    transform(&OUTPUT, transform(&INPUT, v).map(fit)).map(encode_srgb)
+    // The fit is for what a display could show: negative and endless light would come out anywhere.
+    transform(&OUTPUT, transform(&INPUT, v.map(|v| v.clamp(0.0, 65504.0))).map(fit)).map(encode_srgb)
 }
 
 /// Turns pixels of `channels` (3 or 4) numbers into 8-bit sRGB. Alpha, where there is one, is kept linear; premultiplied

@@ -98,6 +98,8 @@ params! {
         weather_origin: [f32; 2] = [0.0, 0.0];
         /// The same in the high clouds' texture, along and across their wind.
         high_origin: [f32; 2] = [0.0, 0.0];
+        /// The same in the second, broader read of that texture.
+        high_broad_origin: [f32; 2] = [0.0, 0.0];
         /// Unit vector along the high clouds' wind.
         high_direction: [f32; 2] = [0.0, 1.0];
         /// How far each of the four large octaves of the high clouds is from its old update to its new one.
@@ -110,6 +112,9 @@ params! {
         high_update_small: [f32; 4] = [0.0; 4];
     }
 }
+
+/// How much larger the second read of the high clouds' texture is than the first (as in high_layer.wgsl).
+const HIGH_BROAD: f32 = 3.2;
 
 /// Altitude where the air ends, m (Hillaire 2020).
 const AIR_TOP: f64 = 100_000.0;
@@ -194,7 +199,9 @@ impl Frame {
         let along = compass(f64::from(high.direction));
         let across = DVec2::new(-along.y, along.x);
         let at = eye.truncate() - along * f64::from(high.speed) * time;
-        self.high_origin = plane(DVec2::new(at.dot(along), at.dot(across)), high.scale);
+        let at = DVec2::new(at.dot(along), at.dot(across));
+        self.high_origin = plane(at, high.scale);
+        self.high_broad_origin = plane(at, HIGH_BROAD * high.scale);
         self.high_direction = along.as_vec2().to_array();
         for octave in 0..8 {
             let updates = time * f64::from(high.evolution) * f64::from(1u32 << octave);

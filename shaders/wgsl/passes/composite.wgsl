@@ -31,7 +31,7 @@ fn composite(@builtin(global_invocation_id) id: vec3u) {
     let direction = view.xyz;
     let air = sky_radiance(direction);
     let ground = hit_sphere(direction, frame.power_ground);
-    let meets_ground = ground.hit && ground.near > 0.0;
+    let meets_ground = ground.enters;
     let air_beyond = whole_air(direction, ground.near, meets_ground);
 
     // Three layers at most: the high clouds where the ray enters their sphere, the clouds, the high clouds where it

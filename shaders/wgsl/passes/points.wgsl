@@ -33,14 +33,14 @@ fn sun_transmittance_at_points(@builtin(global_invocation_id) id: vec3u) {
     let base = params.clouds.base;
     let high = params.high_clouds.altitude;
     let ground = crossing(b, h * (2.0 * radius + h));
-    if ground.hit && ground.near > 0.0 && h >= 0.0 {
+    if ground.enters {
         results[id.x] = vec4f(0.0);
         return;
     }
     let s = stretches_between(
         crossing(b, (h - top) * (2.0 * radius + h + top)),
         crossing(b, (h - base) * (2.0 * radius + h + base)),
-        Hit(0.0, 0.0, false),
+        Hit(0.0, 0.0, false, false),
     );
     let length = s.first + s.second;
     let steps = clamp(ceil(length / SUN_STEP), 1.0, MAX_SUN_STEPS);

@@ -75,6 +75,16 @@ def test_what_stops_becomes_the_still(renderer):
     assert twin.relative_rmse(colours(last), colours(still)) < 0.02
 
 
+def test_what_vanishes_leaves_no_ghost(renderer):
+    """No cut, and yet nothing of the frame before is kept where its like is nowhere around."""
+    params = PARAMS.with_(**{"high_clouds.coverage": 0.0})
+    clear = params.with_(**{"clouds.coverage": 0.0})
+    shots = [(CAMERA, params, 0.0)] * 3 + [(CAMERA, clear, 0.0)]
+    *_, before, after = renderer(*SIZE).animate(shots, background=None)
+    assert before[..., 3].max() > 0.5
+    assert after[..., 3].max() < 1e-3
+
+
 CUTS = {
     "turn": (look(120), PARAMS, 0.0),
     "lens": (nubis.Camera.look_at((0, 0, 300), (0, 1000, 500), fov_y=20), PARAMS, 0.0),

@@ -299,8 +299,10 @@ def test_forked_children(before, inside, code):
     assert done.returncode == code, done.stderr
 
 
+# Jobs that a shell starts in the background ignore SIGINT, and so would their children.
 LONG = """
-import sys, nubis
+import signal, nubis
+signal.signal(signal.SIGINT, signal.default_int_handler)
 camera, params = nubis.scenes["fair_weather"]
 nubis.Renderer(8, 8, quality="draft").render(camera, params)
 renderer = nubis.Renderer(8192, 8192, quality="draft")

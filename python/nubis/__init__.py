@@ -19,7 +19,7 @@ from nubis._errors import (
     ParameterError,
 )
 from nubis._image import save, to_srgb8
-from nubis._nubis import Camera
+from nubis._nubis import Camera, DensityGrid
 from nubis._renderer import Adapter, Renderer, adapters, quality
 from nubis._scenes import scenes
 from nubis.params import (
@@ -42,6 +42,7 @@ __all__ = [
     "Atmosphere",
     "Camera",
     "Clouds",
+    "DensityGrid",
     "DeviceError",
     "FileError",
     "ForkError",

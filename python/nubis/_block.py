@@ -14,6 +14,7 @@ import tomli_w
 
 from nubis import _nubis
 from nubis._errors import ParameterError
+from nubis._nubis import DensityGrid
 
 
 class Base:
@@ -75,8 +76,12 @@ class Root(Base):
         for field in dataclasses.fields(self):
             value = getattr(self, field.name)
             wanted = field.default_factory
-            if not (isinstance(wanted, type) and isinstance(value, wanted)):
+            if field.default is None:  # A group that may be missing: the volume.
+                fits, allowed = value is None or isinstance(value, DensityGrid), "DensityGrid or None"
+            else:
+                fits = isinstance(wanted, type) and isinstance(value, wanted)
                 allowed = getattr(wanted, "__name__", "?")
+            if not fits:
                 raise ParameterError(
                     f"{field.name} = {value!r} is not allowed: it must be a nubis.{allowed}"
                 )
@@ -94,6 +99,11 @@ class Root(Base):
         new = {}
         for block, fields in blocks.items():
             old = getattr(self, block)
+            if not isinstance(old, Block):
+                path, value = next(iter(fields.items()))
+                raise ParameterError(
+                    f"{block}.{path} = {value!r} is not allowed: replace(volume=...) sets it whole"
+                )
             names = [f.name for f in dataclasses.fields(old)]
             for name, value in fields.items():
                 if name not in names:
@@ -103,7 +113,8 @@ class Root(Base):
 
     def to_dict(self) -> dict[str, dict[str, Any]]:
         """Return plain values by group and field name; arrays as nested lists."""
-        return {f.name: getattr(self, f.name).to_dict() for f in dataclasses.fields(self)}
+        groups = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
+        return {name: group.to_dict() for name, group in groups.items() if group is not None}
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Mapping[str, Any]]) -> Self:
@@ -111,13 +122,17 @@ class Root(Base):
         if not isinstance(values, Mapping):
             raise ParameterError(f"values = {values!r} is not allowed: it must be a mapping")
         changes = {}
+        whole = {}
         for block, fields in values.items():
             if not isinstance(fields, Mapping):
                 raise ParameterError(f"{block} = {fields!r} is not allowed: it must be a table")
+            if block == "volume":
+                whole[block] = _grid(fields)
+                continue
             for name, value in fields.items():
                 deep = isinstance(value, list) and value and isinstance(value[0], list)
                 changes[f"{block}.{name}"] = _array(block, name, value) if deep else value
-        return cls().with_(**changes)
+        return cls(**whole).with_(**changes)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write all parameters to a TOML file."""
@@ -146,6 +161,17 @@ def _array(block: str, name: str, value: list[Any]) -> np.ndarray[Any, Any]:
         raise ParameterError(
             f"{block}.{name} = (nested lists) is not allowed: they must form an array ({error})"
         ) from error
+
+
+def _grid(fields: Mapping[str, Any]) -> DensityGrid:
+    names = ["extinction", "bounds"]
+    for name, value in fields.items():
+        if name not in names:
+            raise _unknown(f"volume.{name}", value, names)
+    for name in names:
+        if name not in fields:
+            raise ParameterError(f"volume.{name} is missing: a volume has {' and '.join(names)}")
+    return DensityGrid(_array("volume", "extinction", fields["extinction"]), fields["bounds"])
 
 
 def _unknown(path: str, value: Any, names: list[str]) -> ParameterError:

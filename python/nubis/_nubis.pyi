@@ -10,6 +10,7 @@ from nubis.params import Params, Quality
 
 __all__ = [
     "Camera",
+    "DensityGrid",
     "Renderer",
     "adapters",
     "check",
@@ -122,6 +123,40 @@ class Camera:
     def _restore(state: _CameraState) -> Camera: ...
 
 @final
+class DensityGrid:
+    """A cloud of your own: extinction on a grid.
+
+    Parameters
+    ----------
+    extinction : array-like of float32, shape (nz, ny, nx)
+        In 1/m, at the centres of the voxels, trilinear between them; the outermost values hold to
+        the faces of the box, outside there is nothing.
+    bounds : ((x0, y0, z0), (x1, y1, z1))
+        Lowest and highest corner of the box in world metres. It is straight: the planet's
+        curvature does not bend it, and the wind does not move it.
+    """
+
+    def __new__(cls, extinction: npt.ArrayLike, bounds: npt.ArrayLike) -> DensityGrid: ...
+    @property
+    def extinction(self) -> npt.NDArray[np.float32]:
+        """Extinction in 1/m, float32 of shape (nz, ny, nx): a copy."""
+
+    @property
+    def bounds(self) -> tuple[_Vector, _Vector]:
+        """Lowest and highest corner in world metres."""
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Shape of the grid: (nz, ny, nx)."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values by name: extinction as nested lists."""
+
+    def __hash__(self) -> int: ...
+    def __eq__(self, other: object) -> bool: ...
+    def __reduce__(self) -> Any: ...
+
+@final
 class Renderer:
     """What `nubis.Renderer` wraps: no defaults, plain values."""
 
@@ -136,6 +171,7 @@ class Renderer:
         npt.NDArray[np.float32],
         npt.NDArray[np.float32],
         npt.NDArray[np.uint32],
+        npt.NDArray[np.float32] | None,
     ]:
         """Clouds with alpha, sky, depth (-1 where there is none), density evaluations."""
 

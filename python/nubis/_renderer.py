@@ -51,8 +51,8 @@ def adapters() -> list[Adapter]:
 def quality(name: str) -> Quality:
     """Return the numerical method of that name, to look at or to change.
 
-    Names: ``"draft"``, ``"balanced"``, ``"high"``, and the published settings of the sources,
-    ``"nubis2015"``, ``"thesis2018"``, ``"vsu2022"``.
+    Names: ``"draft"``, ``"balanced"``, ``"high"``, ``"reference"`` (converged, slow), and the
+    published settings of the sources, ``"nubis2015"``, ``"thesis2018"``, ``"vsu2022"``.
     """
     if not isinstance(name, str):
         raise ParameterError(f"quality = {name!r} is not allowed: it must be a name or a Quality")
@@ -181,18 +181,28 @@ class Renderer:
               inf where there are none.
             - ``samples`` uint32 (height, width): density evaluations, primary and light together.
             - ``sky`` float32 (height, width, 3): radiance of the sky without clouds.
+            - ``standard_error`` float32 (height, width, 3), with light model ``"path"``: one
+              standard error of the clouds' radiance, before the air in front of them.
+            - ``change`` float32 (height, width, 3), with quality ``"reference"``: how much that
+              radiance changed when the steps were halved for the last time.
         """
         _check_camera(camera)
         _check_params(params)
-        image, sky, depth, samples = self._core.render_layers(camera, params, _time(time))
+        image, sky, depth, samples, uncertainty = self._core.render_layers(
+            camera, params, _time(time)
+        )
         depth[depth < 0] = np.inf
-        return {
+        layers = {
             "radiance": np.ascontiguousarray(image[..., :3]),
             "transmittance": 1 - image[..., 3],
             "depth": depth,
             "samples": samples,
             "sky": np.ascontiguousarray(sky[..., :3]),
         }
+        if uncertainty is not None:
+            name = "standard_error" if params.light.model == "path" else "change"
+            layers[name] = np.ascontiguousarray(uncertainty[..., :3])
+        return layers
 
     def animate(
         self,
@@ -205,7 +215,8 @@ class Renderer:
 
         One pixel in sixteen is marched per frame, the others follow the clouds from the frame
         before; the first frame and the first after a cut are stills. A static shot converges to
-        the still, and beyond it to less noise.
+        the still. With light model ``"path"`` or quality ``"reference"`` every frame is a still,
+        and a static shot goes on tracing paths: each frame has less noise.
 
         Parameters
         ----------

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nubis._block import Block, Root
+from nubis._nubis import DensityGrid
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -207,9 +208,9 @@ class Light(Block):
 
     Attributes
     ----------
-    model : {single, nubis2015, thesis2018, vsu2022}
+    model : {single, nubis2015, thesis2018, vsu2022, octaves, path}
         The physics of the light in the clouds. Allowed: one of "single", "nubis2015", "thesis2018",
-        "vsu2022".
+        "vsu2022", "octaves", "path".
     g : float
         Mean cosine of the forward lobe of the phase function. Allowed: a number from -0.9999 to
         0.9999.
@@ -219,15 +220,28 @@ class Light(Block):
     lobe_mix : float
         Share of the forward lobe (vsu2022). Allowed: a number from 0 to 1.
     albedo : float
-        Single-scattering albedo of a droplet (`single`). Allowed: a number from 0 to 1.
+        Single-scattering albedo of a droplet (`single`, `octaves`, `path`). Allowed: a number from
+        0 to 1.
+    octaves : int
+        Orders of scattering that `octaves` sums up. Allowed: a whole number from 1 to 16.
+    octave_scattering : float
+        Share of the light that each octave keeps of the one before. Allowed: a number from 0 to 1.
+    octave_extinction : float
+        Share of the extinction toward the sun that each octave keeps of the one before. Allowed: a
+        number from 0 to 1.
+    octave_phase : float
+        Share of `g` that each octave keeps of the one before. Allowed: a number from 0 to 1.
     sun_gain : float
-        Gain of the sunlight in the models that do not conserve energy (all but `single`). Allowed:
-        a number from 0 to 1000.
+        Gain of the sunlight in the published models, which do not conserve energy. Allowed: a
+        number from 0 to 1000.
     absorption : float
-        How thick the models that do not conserve energy take the cloud to be on the way to the sun
-        (all but `single`). Allowed: a number from 0 to 10.
+        How thick the published models take the cloud to be on the way to the sun. Allowed: a number
+        from 0 to 10.
+    ambient : tuple[float, float, float]
+        Radiance that reaches the clouds from every direction, besides that of sun and sky (all but
+        `single`). Allowed: 3 numbers from 0 to 1000000.
     ambient_gain : float
-        Gain of the ambient light (all but `single`). Allowed: a number from 0 to 1000.
+        Gain of the ambient light of the sky (all but `single`). Allowed: a number from 0 to 1000.
     ambient_top : tuple[float, float, float]
         Tint of the ambient light at the top of the clouds; its brightness comes from the sky.
         Allowed: 3 numbers from 0 to 1000.
@@ -240,24 +254,25 @@ class Light(Block):
     rain_absorption : float
         How many times more light is absorbed where precipitation is 1 (nubis2015). Allowed: a
         number from 1 to 100.
-    cone : float
-        Half width of the cone of light samples, as a share of its length; `single` looks straight
-        at the sun. Allowed: a number from 0 to 1.
     """
 
-    model: Literal["single", "nubis2015", "thesis2018", "vsu2022"] = "thesis2018"
+    model: Literal["single", "nubis2015", "thesis2018", "vsu2022", "octaves", "path"] = "thesis2018"
     g: float = 0.6
     g_back: float = -0.25
     lobe_mix: float = 0.5
     albedo: float = 0.999
+    octaves: int = 3
+    octave_scattering: float = 0.5
+    octave_extinction: float = 0.5
+    octave_phase: float = 0.5
     sun_gain: float = 2.2
     absorption: float = 0.22
+    ambient: tuple[float, float, float] = (0.0, 0.0, 0.0)
     ambient_gain: float = 1.0
     ambient_top: tuple[float, float, float] = (1.0, 1.0, 1.0)
     ambient_bottom: tuple[float, float, float] = (1.0, 1.0, 1.0)
     powder: float = 0.6
     rain_absorption: float = 2.5
-    cone: float = 0.12
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -315,6 +330,9 @@ class Quality(Block):
     far_sample : bool
         Whether there is a far light sample, for shadows from distant clouds. Allowed: True or
         False.
+    cone : float
+        Half width of the cone that the light samples are spread over, as a share of its length
+        (nubis2015); 0 looks straight at the sun. Allowed: a number from 0 to 1.
     cheap_light : float
         Opacity in front of a sample past which its light samples leave out the detail (nubis2015:
         0.3). Allowed: a number from 0 to 1.
@@ -325,6 +343,16 @@ class Quality(Block):
         Whether each ray starts at a blue-noise offset of up to one step. Allowed: True or False.
     view_distance : float
         Farthest distance at which clouds are marched. Allowed: a number from 1000 to 1000000000 m.
+    tolerance : float
+        Largest relative change of a pixel when all steps are halved; they are until it is met. It
+        replaces everything above but `view_distance` by an integration that converges, and sun rays
+        go to the end of the clouds; 0 marches with the settings above. Allowed: a number from 0 to
+        1.
+    path_samples : int
+        Paths traced for each pixel (light model `path`). Allowed: a whole number from 1 to 1048576.
+    path_scatterings : int
+        Most scatterings of a path (light model `path`); 1 is single scattering. Allowed: a whole
+        number from 1 to 1048576.
     """
 
     steps_zenith: int = 80
@@ -335,10 +363,14 @@ class Quality(Block):
     light_steps: int = 8
     light_distance: float = 2500.0
     far_sample: bool = True
+    cone: float = 0.0
     cheap_light: float = 0.3
     min_transmittance: float = 0.01
     jitter: bool = True
     view_distance: float = 400000.0
+    tolerance: float = 0.0
+    path_samples: int = 64
+    path_scatterings: int = 4096
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -362,6 +394,8 @@ class Params(Root):
         How light becomes colour.
     atmosphere : Atmosphere
         The planet and its air.
+    volume : DensityGrid or None
+        A cloud of your own in place of the procedural ones.
     """
 
     sun: Sun = field(default_factory=Sun)
@@ -371,3 +405,4 @@ class Params(Root):
     high_clouds: HighClouds = field(default_factory=HighClouds)
     light: Light = field(default_factory=Light)
     atmosphere: Atmosphere = field(default_factory=Atmosphere)
+    volume: DensityGrid | None = None

@@ -2,6 +2,11 @@
 #import params
 #import frame
 
+// What a pipeline is made for; the rest is compiled out (crates/clouds_core/src/kernel.rs).
+override MODEL: u32 = 0u; // light.model
+override VOLUME: bool = false; // the clouds are the user's grid, not procedural
+override PRECISE: bool = false; // that grid is read by loads and in f32, not filtered by the hardware in half floats
+
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<uniform> frame: Frame;
 @group(0) @binding(28) var<uniform> quality: Quality;
@@ -18,6 +23,10 @@
 @group(0) @binding(10) var<storage, read_write> sky_light: array<vec4f, 4>; // what the sky gives to clouds (passes/sky)
 @group(0) @binding(11) var blue_noise: texture_2d<f32>; // 64 x 64 ranks in [0, 1), void and cluster
 
+@group(0) @binding(30) var volume: texture_3d<f32>; // the user's grid, 1 at its largest extinction, in half floats
+@group(0) @binding(31) var volume_exact: texture_3d<f32>; // the same in f32, which cannot be filtered everywhere
+@group(0) @binding(32) var majorants: texture_3d<f32>; // what the density nearby never exceeds (passes/majorant)
+
 // One entry a pixel, row by row.
 @group(0) @binding(12) var<storage, read_write> clouds: array<vec4f>; // premultiplied radiance, transmittance
 @group(0) @binding(13) var<storage, read_write> cloud_depth: array<f32>; // m to the mean scattering point, -1 where none
@@ -33,6 +42,66 @@
 @group(0) @binding(20) var<storage, read_write> history_depth: array<f32>;
 @group(0) @binding(21) var<storage, read_write> history_known: array<u32>; // 1 where marched since the cut, 0 where guessed
 @group(0) @binding(22) var<storage, read_write> known: array<u32>;
+
+// Rays that take more steps than one dispatch may: what each remembers, which are not done, and how far each got.
+@group(0) @binding(33) var<storage, read_write> reference_rays: array<ReferenceRay>;
+@group(0) @binding(34) var<storage, read_write> path_rays: array<PathRay>;
+@group(0) @binding(35) var<storage, read_write> active_rays: array<u32>;
+@group(0) @binding(36) var<storage, read_write> progress: array<vec2u>; // iterations in this dispatch, 1 when done
+@group(0) @binding(37) var<storage, read_write> uncertainty: array<vec4f>; // of the radiance of each pixel
+
+// A ray on its way to convergence (passes/reference).
+struct ReferenceRay {
+    previous: vec4f, // radiance and transmittance with panels twice as long
+    stage: u32,
+    level: u32, // how many times the panels have been halved
+    evaluations: u32,
+    x: f32, // m into the stretches
+    longest: f32, // length that the next panel may have, m
+    transmittance: f32,
+    // The panel at hand, and what is known of its two points.
+    end: f32,
+    point: u32,
+    density: vec2f,
+    height: vec2f,
+    precipitation: vec2f,
+    first_depth: f32, // toward the sun, from the first of them
+    // The ray from a point toward the sun.
+    sun_start: f32,
+    sun_first: f32,
+    sun_gap: f32,
+    sun_second: f32,
+    sun_x: f32,
+    sun_depth: f32,
+    // As `Gathered`.
+    sun: f32,
+    above: f32,
+    below: f32,
+    weight: f32,
+    distance: f32,
+}
+
+// A pixel whose paths are traced one after another (passes/path).
+struct PathRay {
+    radiance: vec3f, // sums over the paths so far
+    done: u32, // paths
+    squares: vec3f,
+    seen: f32, // paths that met no cloud
+    throughput: vec3f,
+    distance: f32, // to first scatterings
+    light: vec3f, // of the path at hand
+    stage: u32,
+    origin: vec3f, // of the flight at hand
+    scatterings: u32,
+    direction: vec3f,
+    x: f32, // m into the stretches of the flight
+    flight: vec4f, // as `Stretches`
+    shadow: f32, // transmittance toward the sun so far
+    width: f32, // footprint, m
+    draws: u32, // random numbers used by the path
+    evaluations: u32,
+    sunlight: vec3f, // what the sun adds to the path if nothing shadows it
+}
 
 // Outputs of the bakes.
 @group(0) @binding(23) var volume_in: texture_3d<f32>;

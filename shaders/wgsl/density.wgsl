@@ -1,6 +1,8 @@
-// The cloud field: weather, height profile, base shape, detail (nubis2015, "density sampler"; thesis2018, "six steps").
+// The cloud field: weather, height profile, base shape, detail (nubis2015, "density sampler"; thesis2018, "six steps");
+// or the user's grid in its place.
 #import math
 #import bindings
+#import volume
 
 // How many times the field was read by this invocation.
 var<private> evaluations: u32 = 0u;
@@ -21,9 +23,9 @@ struct Column {
     limit: f32, // the base shape cannot exceed it; 0 where there is no cloud
     profile: f32,
     coverage: f32,
-    height: f32, // 0 at the base of the shell, 1 at its top
+    height: f32, // 0 at the base of the clouds, 1 at their top
     precipitation: f32,
-    at: vec2f, // where the point would be without the wind's lean, m
+    at: vec3f, // where the noises are read: without the wind's lean, the altitude as z, m; in a grid the point itself
 }
 
 // How the three parameters of a cloud meet the weather map (vsu2022: coverage shifts the map).
@@ -37,11 +39,16 @@ fn weather_from_map(texel: vec3f) -> LocalWeather {
     return LocalWeather(max(shifted, wet), mix(kind, 1.0, rain), rain);
 }
 
-// Density by height for a type: the weighted sum of three profiles.
-fn height_profile(height: f32, kind: f32) -> f32 {
+// Where the profile of a type rises and falls: the weighted sum of three.
+fn profile_edges(kind: f32) -> vec4f {
     let stratus = saturate(1.0 - 2.0 * kind);
     let cumulus = saturate(2.0 * kind - 1.0);
-    let g = stratus * STRATUS + (1.0 - stratus - cumulus) * STRATOCUMULUS + cumulus * CUMULUS;
+    return stratus * STRATUS + (1.0 - stratus - cumulus) * STRATOCUMULUS + cumulus * CUMULUS;
+}
+
+// Density by height for a type.
+fn height_profile(height: f32, kind: f32) -> f32 {
+    let g = profile_edges(kind);
     return remap01(height, g.x, g.y) * (1.0 - smoothstep(g.z, g.w, height));
 }
 
@@ -65,6 +72,10 @@ fn eroded(shape: f32, detail: f32, height: f32) -> f32 {
 // The weather at a point `p`, relative to the camera.
 fn cloud_column(p: vec3f, altitude: f32) -> Column {
     evaluations += 1u;
+    if VOLUME {
+        let height = saturate((p.z - frame.volume_low.z) / (frame.volume_high.z - frame.volume_low.z));
+        return Column(select(0.0, 1.0, in_volume(p)), 1.0, 1.0, height, 0.0, p);
+    }
     let height = (altitude - params.clouds.base) / (params.clouds.top - params.clouds.base);
     let at = p.xy - height * params.wind.shear * frame.wind_direction;
     let uv = frame.weather_origin + vec2f(at.x, -at.y) / params.weather.extent;
@@ -73,23 +84,30 @@ fn cloud_column(p: vec3f, altitude: f32) -> Column {
     // The noise is at most 1: where the profile alone does not rise above 1 - coverage, nothing does.
     let inside = height > 0.0 && height < 1.0;
     let limit = select(0.0, with_coverage(profile, weather.coverage), inside);
-    return Column(limit, profile, weather.coverage, height, weather.precipitation, at);
+    return Column(limit, profile, weather.coverage, height, weather.precipitation, vec3f(at, altitude));
 }
 
 // The base shape, before detail: cheap, and never smaller than the density. `width` is the size of what one sample
 // stands for, in metres.
-fn cloud_shape(column: Column, altitude: f32, width: f32) -> f32 {
+fn cloud_shape(column: Column, width: f32) -> f32 {
+    if VOLUME {
+        return select(0.0, volume_density(column.at), column.limit > 0.0);
+    }
     let lod = log2(max(width * 128.0 / params.clouds.shape_scale, 1.0));
-    let at = frame.shape_origin + vec3f(column.at, altitude) / params.clouds.shape_scale;
+    let at = frame.shape_origin + column.at / params.clouds.shape_scale;
     let noise = textureSampleLevel(shape_noise, repeat_sampler, at, lod);
     let shape = with_coverage(base_shape(noise) * column.profile, column.coverage);
     return select(0.0, shape, column.limit > 0.0);
 }
 
 // The density at a point whose shape is known.
-fn cloud_density(column: Column, shape: f32, altitude: f32, width: f32) -> f32 {
-    let swirl = textureSampleLevel(curl_noise, repeat_sampler, frame.curl_origin + column.at / params.clouds.curl_scale, 0.0).xy;
-    let moved = vec3f(column.at + params.clouds.curl * (1.0 - column.height) * swirl, altitude);
+fn cloud_density(column: Column, shape: f32, width: f32) -> f32 {
+    if VOLUME {
+        return shape;
+    }
+    let curl_at = frame.curl_origin + column.at.xy / params.clouds.curl_scale;
+    let swirl = textureSampleLevel(curl_noise, repeat_sampler, curl_at, 0.0).xy;
+    let moved = column.at + vec3f(params.clouds.curl * (1.0 - column.height) * swirl, 0.0);
     let lod = log2(max(width * 32.0 / params.clouds.detail_scale, 1.0));
     let at = frame.detail_origin + moved / params.clouds.detail_scale;
     let detail = fbm3(textureSampleLevel(detail_noise, repeat_sampler, at, lod).rgb);
@@ -99,11 +117,14 @@ fn cloud_density(column: Column, shape: f32, altitude: f32, width: f32) -> f32 {
 // The density with everything read.
 fn cloud_density_at(p: vec3f, altitude: f32, width: f32) -> f32 {
     let column = cloud_column(p, altitude);
-    return cloud_density(column, cloud_shape(column, altitude, width), altitude, width);
+    return cloud_density(column, cloud_shape(column, width), width);
 }
 
 // The density without reading the detail: eroded by its mean instead, so that light samples keep their mean.
 fn cloud_density_cheap(p: vec3f, altitude: f32, width: f32) -> f32 {
-    let shape = cloud_shape(cloud_column(p, altitude), altitude, width);
+    let shape = cloud_shape(cloud_column(p, altitude), width);
+    if VOLUME {
+        return shape;
+    }
     return remap01(shape, 0.5 * params.clouds.detail, 1.0);
 }

@@ -19,19 +19,18 @@ const CONE = array<vec3f, 6>(
 fn optical_depth_to_sun(p: vec3f, opacity: f32, width: f32) -> f32 {
     let n = quality.light_steps;
     let reach = quality.light_distance;
-    let cone = select(params.light.cone, 0.0, params.light.model == MODEL_SINGLE);
     var depth = 0.0;
     // Behind little cloud the near samples see the detail; the others are cheap.
     let full = select(0u, n, opacity < quality.cheap_light);
     for (var i = 0u; i < full; i++) {
-        let at = light_sample(p, i, n, reach, cone, width);
+        let at = light_sample(p, i, n, reach, width);
         depth += cloud_density_at(at.p, at.altitude, at.width) * at.length;
     }
     for (var i = full; i < n + quality.far_sample; i++) {
-        let at = light_sample(p, i, n, reach, cone, width);
+        let at = light_sample(p, i, n, reach, width);
         depth += cloud_density_cheap(at.p, at.altitude, at.width) * at.length;
     }
-    return depth * params.clouds.extinction;
+    return depth * frame.extinction;
 }
 
 struct LightSample {
@@ -41,13 +40,13 @@ struct LightSample {
     width: f32,
 }
 
-fn light_sample(p: vec3f, i: u32, n: u32, reach: f32, cone: f32, width: f32) -> LightSample {
+fn light_sample(p: vec3f, i: u32, n: u32, reach: f32, width: f32) -> LightSample {
     let a = f32(i) / f32(n);
     let b = f32(i + 1u) / f32(n);
     let is_far = i == n;
     let length = select((b * b - a * a) * reach, 4.0 * reach, is_far);
     let s = select(0.5 * (b * b + a * a) * reach, 3.0 * reach, is_far);
-    let at = p + s * (frame.sun_direction + cone * CONE[i % 6u]);
+    let at = p + s * (frame.sun_direction + quality.cone * CONE[i % 6u]);
     return LightSample(at, altitude_at(at), length, max(width, 0.5 * length));
 }
 
@@ -55,7 +54,7 @@ fn light_sample(p: vec3f, i: u32, n: u32, reach: f32, cone: f32, width: f32) -> 
 fn model_phase(one_minus_mu: f32) -> f32 {
     let forward = henyey_greenstein(one_minus_mu, params.light.g);
     let backward = henyey_greenstein(one_minus_mu, params.light.g_back);
-    switch params.light.model {
+    switch MODEL {
         case MODEL_THESIS2018: {
             return max(forward, backward);
         }
@@ -68,19 +67,52 @@ fn model_phase(one_minus_mu: f32) -> f32 {
     }
 }
 
-// What the model makes of sunlight that has crossed the optical depth `depth`, without the phase function.
-fn sun_energy(depth: f32, precipitation: f32) -> f32 {
-    if params.light.model == MODEL_SINGLE {
-        return params.light.albedo * exp(-depth);
+// What a cloud sends toward the eye of sunlight that has crossed the optical depth `depth`: radiance for each unit of
+// irradiance and of the eye's own optical depth.
+fn sun_scattering(depth: f32, precipitation: f32, one_minus_mu: f32) -> f32 {
+    if MODEL == MODEL_SINGLE {
+        return params.light.albedo * model_phase(one_minus_mu) * exp(-depth);
+    }
+    // Paths are not traced through the high clouds, which have no thickness.
+    if MODEL == MODEL_OCTAVES || MODEL == MODEL_PATH {
+        return params.light.albedo * octaves(depth, one_minus_mu);
     }
     // Artistic models see a thinner cloud, and a thicker one where it rains (nubis2015's p).
     let d = depth * params.light.absorption * mix(1.0, params.light.rain_absorption, precipitation);
     let powder = 1.0 - params.light.powder * exp(-2.0 * d);
     var beer = exp(-d);
-    if params.light.model == MODEL_THESIS2018 {
+    if MODEL == MODEL_THESIS2018 {
         beer = max(beer, 0.7 * exp(-0.5 * d));
     }
-    return 2.0 * params.light.sun_gain * beer * powder;
+    return 2.0 * params.light.sun_gain * beer * powder * model_phase(one_minus_mu);
+}
+
+// Further orders as copies of the first with less light, less extinction and less anisotropy each (Wrenninge et al. 2013,
+// Hillaire 2016).
+fn octaves(depth: f32, one_minus_mu: f32) -> f32 {
+    var sum = 0.0;
+    var share = 1.0;
+    var d = depth;
+    var g = params.light.g;
+    for (var i = 0u; i < params.light.octaves; i++) {
+        sum += share * henyey_greenstein(one_minus_mu, g) * exp(-d);
+        share *= params.light.octave_scattering;
+        d *= params.light.octave_extinction;
+        g *= params.light.octave_phase;
+    }
+    return sum;
+}
+
+// The optical depth toward the sun from which on `sun_scattering` is less than a millionth of what it is at none.
+fn dark_depth() -> f32 {
+    const MILLIONTH = 14.0;
+    var slowest = 1.0;
+    if MODEL == MODEL_OCTAVES {
+        slowest = pow(params.light.octave_extinction, f32(params.light.octaves - 1u));
+    } else if MODEL != MODEL_SINGLE {
+        slowest = params.light.absorption * select(1.0, 0.5, MODEL == MODEL_THESIS2018);
+    }
+    return MILLIONTH / max(slowest, 1e-6);
 }
 
 // Share of the ambient light at a height that comes from above; the rest comes from below.
@@ -88,6 +120,40 @@ fn ambient_share(height: f32) -> f32 {
     return saturate(height);
 }
 
-fn has_ambient() -> f32 {
-    return select(params.light.ambient_gain, 0.0, params.light.model == MODEL_SINGLE);
+// Ambient radiance from above and from below.
+fn ambient_above() -> vec3f {
+    return params.light.ambient + params.light.ambient_gain * params.light.ambient_top * sky_light[0].rgb;
+}
+
+fn ambient_below() -> vec3f {
+    return params.light.ambient + params.light.ambient_gain * params.light.ambient_bottom * sky_light[1].rgb;
+}
+
+// What a ray has gathered on its way through the clouds. Scalars alone are summed; colours come once, at the end.
+struct Gathered {
+    sun: f32, // of sun_scattering
+    above: f32, // share of the ambient light from above
+    below: f32,
+    weight: f32, // of all samples: 1 less the transmittance
+    distance: f32, // weighted, m
+}
+
+fn gather(sum: Gathered, weight: f32, sun: f32, height: f32, distance: f32) -> Gathered {
+    let above = ambient_share(height);
+    return Gathered(
+        sum.sun + weight * sun,
+        sum.above + weight * above,
+        sum.below + weight * (1.0 - above),
+        sum.weight + weight,
+        sum.distance + weight * distance,
+    );
+}
+
+// The radiance of what was gathered.
+fn gathered_radiance(sum: Gathered) -> vec3f {
+    let sun = sum.sun * sky_light[2].rgb;
+    if MODEL == MODEL_SINGLE {
+        return sun;
+    }
+    return sun + sum.above * ambient_above() + sum.below * ambient_below();
 }

@@ -17,3 +17,23 @@ fn one_minus_cos(a: vec3f, b: vec3f) -> f32 {
     let d = a - b;
     return min(0.5 * dot(d, d), 2.0);
 }
+
+// A direction scattered from `direction` by Henyey and Greenstein's function, for two random numbers. The cosine comes as
+// its difference to 1, without the cancellations of the printed form (hazard 5).
+fn scattered(direction: vec3f, g: f32, u: vec2f) -> vec3f {
+    var one_minus_mu = 2.0 * u.x;
+    if abs(g) > 1e-4 {
+        let s = (1.0 - g) * (1.0 + g) / (1.0 - g + 2.0 * g * u.x);
+        one_minus_mu = clamp((s + 1.0 - g) * (1.0 - g) * (1.0 - u.x) / (1.0 - g + 2.0 * g * u.x), 0.0, 2.0);
+    }
+    let sine = sqrt(one_minus_mu * (2.0 - one_minus_mu));
+    let angle = 2.0 * PI * u.y - PI;
+    let across = perpendicular(direction);
+    let side = cos(angle) * across + sin(angle) * cross(direction, across);
+    return normalize((1.0 - one_minus_mu) * direction + sine * side);
+}
+
+// A unit vector at right angles to a unit vector.
+fn perpendicular(v: vec3f) -> vec3f {
+    return normalize(select(cross(v, vec3f(1.0, 0.0, 0.0)), cross(v, vec3f(0.0, 0.0, 1.0)), abs(v.x) > 0.7));
+}

@@ -30,6 +30,14 @@ fn hit_sphere(direction: vec3f, power: f32) -> Hit {
     return crossing(frame.centre_distance * dot(frame.zenith, direction), power);
 }
 
+// Where a ray from a point crosses the sphere at an altitude.
+fn hit_sphere_from(p: vec3f, direction: vec3f, altitude: f32) -> Hit {
+    let radius = params.atmosphere.planet_radius;
+    let h = altitude_at(p);
+    let b = (radius + h) * cos_zenith_at(p, direction);
+    return crossing(b, (h - altitude) * (2.0 * radius + h + altitude));
+}
+
 // Altitude of a point.
 fn altitude_at(p: vec3f) -> f32 {
     let rh = frame.centre_distance;
@@ -43,7 +51,7 @@ fn cos_zenith_at(p: vec3f, direction: vec3f) -> f32 {
     return dot(up, direction) / max(length(up), 1.0);
 }
 
-// The part of a ray inside the cloud shell: up to two stretches, the second after the ray has passed under the base.
+// The part of a ray where there can be cloud: up to two stretches, the second after the ray has passed under the base.
 // It runs to the last exit of the shell: ending it at the first would cut a band along the horizon.
 struct Stretches {
     start: f32,
@@ -52,20 +60,33 @@ struct Stretches {
     second: f32, // length of the second stretch
 }
 
+// Of a ray from the camera. The ground hides what is behind it, but not from below the surface (a camera under z = 0).
 fn cloud_stretches(direction: vec3f) -> Stretches {
+    let ground = hit_sphere(direction, frame.power_ground);
+    let end = select(1e30, ground.near, ground.enters);
+    if VOLUME {
+        return box_stretch(vec3f(0.0), direction, end);
+    }
+    return stretches_between(hit_sphere(direction, frame.power_top), hit_sphere(direction, frame.power_base), end);
+}
+
+// Of a ray from a point, as if there were no ground.
+fn cloud_stretches_from(p: vec3f, direction: vec3f) -> Stretches {
+    if VOLUME {
+        return box_stretch(p, direction, 1e30);
+    }
     return stretches_between(
-        hit_sphere(direction, frame.power_top),
-        hit_sphere(direction, frame.power_base),
-        hit_sphere(direction, frame.power_ground),
+        hit_sphere_from(p, direction, params.clouds.top),
+        hit_sphere_from(p, direction, params.clouds.base),
+        1e30,
     );
 }
 
-fn stretches_between(outer: Hit, inner: Hit, ground: Hit) -> Stretches {
+fn stretches_between(outer: Hit, inner: Hit, limit: f32) -> Stretches {
     if !outer.hit {
         return Stretches(0.0, 0.0, 0.0, 0.0);
     }
-    // Below the surface (a camera under z = 0) the ground does not hide anything.
-    let end = select(outer.far, min(outer.far, ground.near), ground.enters);
+    let end = min(outer.far, limit);
     if !inner.hit || inner.near >= end {
         return Stretches(outer.near, max(end - outer.near, 0.0), 0.0, 0.0);
     }
@@ -75,4 +96,21 @@ fn stretches_between(outer: Hit, inner: Hit, ground: Hit) -> Stretches {
         return Stretches(inner.far, second, 0.0, 0.0);
     }
     return Stretches(outer.near, first, inner.far - inner.near, second);
+}
+
+// Through the box of the user's grid. A direction along a face divides by a number that is small, not zero (hazard 17).
+fn box_stretch(p: vec3f, direction: vec3f, limit: f32) -> Stretches {
+    let d = select(direction, vec3f(1e-20), abs(direction) < vec3f(1e-20));
+    let a = (frame.volume_low - p) / d;
+    let b = (frame.volume_high - p) / d;
+    let near = min(a, b);
+    let far = max(a, b);
+    let start = max(max(near.x, near.y), max(near.z, 0.0));
+    let end = min(min(far.x, far.y), min(far.z, limit));
+    return Stretches(start, max(end - start, 0.0), 0.0, 0.0);
+}
+
+// The distance along a ray that lies `x` metres into its stretches.
+fn stretch_distance(s: Stretches, x: f32) -> f32 {
+    return s.start + x + select(0.0, s.gap, x > s.first);
 }

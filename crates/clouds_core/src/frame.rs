@@ -35,6 +35,13 @@ params! {
         /// Shift of the blue noise from frame to frame.
         jitter_shift: f32 = 0.0;
 
+        /// Rays in this dispatch (passes/reference, passes/path).
+        active_rays: u32 = 0;
+        /// Turns that each may take.
+        budget: u32 = 0;
+        /// Number of the first path of each pixel (passes/path).
+        first_sample: u32 = 0;
+
         /// Projection, as in camera.wgsl.
         camera_kind: u32 = 0;
         /// Tangent of half the vertical field of view.
@@ -83,6 +90,17 @@ params! {
         power_high: f32 = 0.0;
         /// The same for the top of the air.
         power_air: f32 = 0.0;
+
+        /// Extinction where the density is 1, 1/m.
+        extinction: f32 = 0.0;
+        /// Lowest corner of the user's grid, relative to the eye, m.
+        volume_low: [f32; 3] = [0.0; 3];
+        /// Highest corner.
+        volume_high: [f32; 3] = [0.0; 3];
+        /// Its voxels in a metre along each axis.
+        volume_scale: [f32; 3] = [0.0; 3];
+        /// The shortest side of a voxel, m.
+        voxel: f32 = 0.0;
 
         /// Unit vector toward the sun.
         sun_direction: [f32; 3] = [0.0, 0.0, 1.0];
@@ -147,6 +165,7 @@ impl Frame {
         frame.set_camera(camera);
         frame.set_planet(camera.eye, params);
         frame.set_wind(camera.eye, params, time);
+        frame.set_volume(camera.eye, params);
         frame.sun_direction = sun_direction(params).as_vec3().to_array();
         frame
     }
@@ -176,6 +195,20 @@ impl Frame {
         self.power_top = power(f64::from(params.clouds.top));
         self.power_high = power(f64::from(params.high_clouds.altitude));
         self.power_air = power(AIR_TOP);
+    }
+
+    fn set_volume(&mut self, eye: DVec3, params: &Params) {
+        let Some(volume) = &params.volume else {
+            self.extinction = params.clouds.extinction;
+            return;
+        };
+        let [low, high] = volume.bounds();
+        let voxels = DVec3::from_array(volume.size().map(|n| n as f64));
+        self.extinction = volume.max();
+        self.volume_low = (low - eye).as_vec3().to_array();
+        self.volume_high = (high - eye).as_vec3().to_array();
+        self.volume_scale = (voxels / (high - low)).as_vec3().to_array();
+        self.voxel = ((high - low) / voxels).min_element() as f32;
     }
 
     fn set_wind(&mut self, eye: DVec3, params: &Params, time: f64) {

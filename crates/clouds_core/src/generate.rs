@@ -97,7 +97,8 @@ fn python() -> String {
          from typing import Literal\n\n\
          import numpy as np\n\
          import numpy.typing as npt\n\n\
-         from nubis._block import Block, Root\n",
+         from nubis._block import Block, Root\n\
+         from nubis._nubis import DensityGrid\n",
     );
     let params = Params::default();
     for (_, block) in params.blocks() {
@@ -113,11 +114,14 @@ fn python() -> String {
         let _ = writeln!(out, "    {name} : {}", block.type_name());
         out.push_str(&wrapped(block.doc(), "        "));
     }
+    out.push_str("    volume : DensityGrid or None\n");
+    out.push_str(&wrapped("A cloud of your own in place of the procedural ones.", "        "));
     out.push_str("    \"\"\"\n\n");
     for (name, block) in params.blocks() {
         let ty = block.type_name();
         let _ = writeln!(out, "    {name}: {ty} = field(default_factory={ty})");
     }
+    out.push_str("    volume: DensityGrid | None = None\n");
     out
 }
 

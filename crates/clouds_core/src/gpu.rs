@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 use crate::error::{Error, Result};
-use crate::kernel::{Binding, Kernel};
+use crate::kernel::{Binding, Kernel, Variant};
 use crate::passes::noise::Noise;
 
 /// What an adapter says of itself.
@@ -141,7 +141,7 @@ pub struct Gpu {
     pub(crate) clamp_sampler: wgpu::Sampler,
     /// The last noise bake: renderers of the same seed share it.
     pub(crate) noise: Mutex<Option<Arc<Noise>>>,
-    kernels: Mutex<HashMap<String, Arc<Kernel>>>,
+    kernels: Mutex<HashMap<(String, Variant), Arc<Kernel>>>,
     nanoseconds_per_tick: Option<f64>,
     failure: Arc<Mutex<Failure>>,
 }
@@ -229,13 +229,14 @@ impl Gpu {
     }
 
     /// The kernel `entry` of `shaders/wgsl/passes/{pass}.wgsl`, compiled on first use.
-    pub fn kernel(&self, pass: &str, entry: &str) -> Result<Arc<Kernel>> {
+    pub(crate) fn kernel(&self, pass: &str, entry: &str, variant: Variant) -> Result<Arc<Kernel>> {
         let mut kernels = lock(&self.kernels);
-        if let Some(kernel) = kernels.get(entry) {
+        let key = (entry.to_owned(), variant);
+        if let Some(kernel) = kernels.get(&key) {
             return Ok(kernel.clone());
         }
-        let kernel = Arc::new(Kernel::new(self, pass, entry)?);
-        kernels.insert(entry.to_owned(), kernel.clone());
+        let kernel = Arc::new(Kernel::new(self, pass, entry, variant)?);
+        kernels.insert(key, kernel.clone());
         Ok(kernel)
     }
 
@@ -279,12 +280,21 @@ impl Gpu {
     /// 8-bit ones have 256 levels (docs/numerics.md), and four channels of them can be stored to on every adapter.
     pub(crate) fn texture(&self, label: &str, size: [u32; 3], mips: u32) -> wgpu::Texture {
         let flat = size[2] == 1;
+        self.baked(label, size, mips, if flat { wgpu::TextureDimension::D2 } else { wgpu::TextureDimension::D3 })
+    }
+
+    /// The same, but never flat.
+    pub(crate) fn texture_3d(&self, label: &str, size: [u32; 3]) -> wgpu::Texture {
+        self.baked(label, size, 1, wgpu::TextureDimension::D3)
+    }
+
+    fn baked(&self, label: &str, size: [u32; 3], mips: u32, dimension: wgpu::TextureDimension) -> wgpu::Texture {
         self.device.create_texture(&wgpu::TextureDescriptor {
             label: Some(label),
             size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: size[2] },
             mip_level_count: mips,
             sample_count: 1,
-            dimension: if flat { wgpu::TextureDimension::D2 } else { wgpu::TextureDimension::D3 },
+            dimension,
             format: wgpu::TextureFormat::Rgba16Float,
             usage: wgpu::TextureUsages::TEXTURE_BINDING
                 | wgpu::TextureUsages::STORAGE_BINDING
@@ -293,12 +303,27 @@ impl Gpu {
         })
     }
 
-    /// Fills a flat texture with rows of four channels.
-    pub(crate) fn write_texture(&self, texture: &wgpu::Texture, texels: &[[half::f16; 4]]) {
+    /// A texture of one channel that is filled from here: half floats to be filtered, or f32 to be loaded.
+    pub(crate) fn volume(&self, label: &str, size: [u32; 3], format: wgpu::TextureFormat) -> wgpu::Texture {
+        self.device.create_texture(&wgpu::TextureDescriptor {
+            label: Some(label),
+            size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: size[2] },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D3,
+            format,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+            view_formats: &[],
+        })
+    }
+
+    /// Fills a texture with texels, row by row.
+    pub(crate) fn write_texture<T: bytemuck::NoUninit>(&self, texture: &wgpu::Texture, texels: &[T]) {
+        let bytes_per_row = Some(size_of::<T>() as u32 * texture.width());
         self.queue.write_texture(
             texture.as_image_copy(),
             bytemuck::cast_slice(texels),
-            wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(8 * texture.width()), rows_per_image: None },
+            wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row, rows_per_image: Some(texture.height()) },
             texture.size(),
         );
     }
@@ -384,6 +409,11 @@ impl Work<'_> {
             self.queries.push(queries);
         }
         Ok(())
+    }
+
+    /// Fills a buffer with zeros.
+    pub fn clear(&mut self, buffer: &wgpu::Buffer) {
+        self.encoder.clear_buffer(buffer, 0, None);
     }
 
     /// Brings `bytes` of a buffer back; [`Work::submit`] returns them in the order of the calls.

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
+use crate::params::{Model, Params, Quality};
 use crate::shader::Linked;
 use wgpu::naga::{AddressSpace, Module, valid::ModuleInfo};
 
@@ -21,6 +22,35 @@ impl<'a> From<&'a wgpu::Buffer> for Binding<'a> {
 impl<'a> From<&'a wgpu::TextureView> for Binding<'a> {
     fn from(view: &'a wgpu::TextureView) -> Self {
         Self::View(view)
+    }
+}
+
+/// What a pipeline is made for: the values of the `override` constants of `bindings.wgsl`. What a picture does not need is
+/// compiled out, not branched over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct Variant {
+    /// The light model.
+    pub model: Model,
+    /// Whether the clouds are the user's grid.
+    pub volume: bool,
+    /// Whether that grid is read in f32.
+    pub precise: bool,
+}
+
+impl Variant {
+    /// What a picture needs.
+    pub fn new(params: &Params, quality: &Quality) -> Self {
+        let model = params.light.model;
+        Self { model, volume: params.volume.is_some(), precise: quality.tolerance > 0.0 || model == Model::Path }
+    }
+
+    fn constants(self) -> [(&'static str, f64); 3] {
+        let switch = |on| f64::from(u8::from(on));
+        [
+            ("MODEL", f64::from(self.model as u32)),
+            ("VOLUME", switch(self.volume)),
+            ("PRECISE", switch(self.precise)),
+        ]
     }
 }
 
@@ -50,13 +80,13 @@ fn used_variables(module: &Module, info: &ModuleInfo, entry: usize) -> Vec<(Stri
 
 impl Kernel {
     /// Links, validates and compiles the kernel `entry` of a pass.
-    pub(crate) fn new(gpu: &Gpu, pass: &str, entry: &str) -> Result<Self> {
+    pub(crate) fn new(gpu: &Gpu, pass: &str, entry: &str, variant: Variant) -> Result<Self> {
         let linked = Linked::new(&format!("passes/{pass}")).map_err(Error::Device)?;
-        Self::from_linked(gpu, &linked, entry)
+        Self::from_linked(gpu, &linked, entry, variant)
     }
 
     #[expect(clippy::disallowed_methods, reason = "the one place that makes pipelines")]
-    pub(crate) fn from_linked(gpu: &Gpu, linked: &Linked, entry: &str) -> Result<Self> {
+    pub(crate) fn from_linked(gpu: &Gpu, linked: &Linked, entry: &str, variant: Variant) -> Result<Self> {
         let (module, info) = linked.parse().map_err(Error::Device)?;
         let index = module
             .entry_points
@@ -73,6 +103,8 @@ impl Kernel {
         // SAFETY: only loop bounding is off, which costs a counter in every loop (ten times the time on some drivers,
         // gfx-rs/wgpu#7698). The shaders are this crate's own, and each of their loops ends. Bounds checks stay.
         let shader = unsafe { gpu.device.create_shader_module_trusted(descriptor, checks) };
+        let declared = |name: &str| module.overrides.iter().any(|(_, o)| o.name.as_deref() == Some(name));
+        let constants: Vec<_> = variant.constants().into_iter().filter(|(name, _)| declared(name)).collect();
         let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label: Some(entry),
             layout: None,
@@ -80,7 +112,7 @@ impl Kernel {
             entry_point: Some(entry),
             compilation_options: wgpu::PipelineCompilationOptions {
                 zero_initialize_workgroup_memory: false,
-                ..Default::default()
+                constants: &constants,
             },
             cache: None,
         });

@@ -17,9 +17,11 @@ mod passes;
 pub mod renderer;
 pub mod schema;
 pub mod shader;
+pub mod volume;
 
 pub use camera::Camera;
 pub use error::{Error, Result};
 pub use gpu::{AdapterInfo, Gpu, adapters};
 pub use params::{Params, Quality};
 pub use renderer::Renderer;
+pub use volume::DensityGrid;

@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use crate::error::{Error, Result};
 use crate::schema::{self, Block, Map};
+use crate::volume::DensityGrid;
 use crate::{choice, params};
 
 choice! {
@@ -30,6 +31,11 @@ choice! {
         Thesis2018 = "thesis2018",
         /// As nubis2015 with a blend of two lobes.
         Vsu2022 = "vsu2022",
+        /// Single scattering, and more of it with ever less extinction and anisotropy for the orders after the first
+        /// (Wrenninge et al. 2013, Hillaire 2016), and ambient.
+        Octaves = "octaves",
+        /// Every order of scattering, path traced: slow, with noise, and the truth that the others are measured by.
+        Path = "path",
     }
 }
 
@@ -144,13 +150,23 @@ params! {
         g_back: f32 = -0.25, in -0.9999..=0.9999 "";
         /// Share of the forward lobe (vsu2022).
         lobe_mix: f32 = 0.5, in 0..=1 "";
-        /// Single-scattering albedo of a droplet (`single`).
+        /// Single-scattering albedo of a droplet (`single`, `octaves`, `path`).
         albedo: f32 = 0.999, in 0..=1 "";
-        /// Gain of the sunlight in the models that do not conserve energy (all but `single`).
+        /// Orders of scattering that `octaves` sums up.
+        octaves: u32 = 3, in 1..=16 "";
+        /// Share of the light that each octave keeps of the one before.
+        octave_scattering: f32 = 0.5, in 0..=1 "";
+        /// Share of the extinction toward the sun that each octave keeps of the one before.
+        octave_extinction: f32 = 0.5, in 0..=1 "";
+        /// Share of `g` that each octave keeps of the one before.
+        octave_phase: f32 = 0.5, in 0..=1 "";
+        /// Gain of the sunlight in the published models, which do not conserve energy.
         sun_gain: f32 = 2.2, in 0..=1000 "";
-        /// How thick the models that do not conserve energy take the cloud to be on the way to the sun (all but `single`).
+        /// How thick the published models take the cloud to be on the way to the sun.
         absorption: f32 = 0.22, in 0..=10 "";
-        /// Gain of the ambient light (all but `single`).
+        /// Radiance that reaches the clouds from every direction, besides that of sun and sky (all but `single`).
+        ambient: [f32; 3] = [0.0, 0.0, 0.0], in 0..=1000000 "";
+        /// Gain of the ambient light of the sky (all but `single`).
         ambient_gain: f32 = 1.0, in 0..=1000 "";
         /// Tint of the ambient light at the top of the clouds; its brightness comes from the sky.
         ambient_top: [f32; 3] = [1.0, 1.0, 1.0], in 0..=1000 "";
@@ -160,8 +176,6 @@ params! {
         powder: f32 = 0.6, in 0..=1 "";
         /// How many times more light is absorbed where precipitation is 1 (nubis2015).
         rain_absorption: f32 = 2.5, in 1..=100 "";
-        /// Half width of the cone of light samples, as a share of its length; `single` looks straight at the sun.
-        cone: f32 = 0.12, in 0..=1 "";
     }
 
     /// The planet and its air.
@@ -196,6 +210,9 @@ params! {
         light_distance: f32 = 2500.0, in 1..=100000 "m";
         /// Whether there is a far light sample, for shadows from distant clouds.
         far_sample: bool = true;
+        /// Half width of the cone that the light samples are spread over, as a share of its length (nubis2015); 0 looks
+        /// straight at the sun.
+        cone: f32 = 0.0, in 0..=1 "";
         /// Opacity in front of a sample past which its light samples leave out the detail (nubis2015: 0.3).
         cheap_light: f32 = 0.3, in 0..=1 "";
         /// Transmittance at which a ray ends; what is left is scaled away, not lost.
@@ -204,6 +221,14 @@ params! {
         jitter: bool = true;
         /// Farthest distance at which clouds are marched.
         view_distance: f32 = 400000.0, in 1000..=1000000000 "m";
+        /// Largest relative change of a pixel when all steps are halved; they are until it is met. It replaces everything
+        /// above but `view_distance` by an integration that converges, and sun rays go to the end of the clouds; 0
+        /// marches with the settings above.
+        tolerance: f32 = 0.0, in 0..=1 "";
+        /// Paths traced for each pixel (light model `path`).
+        path_samples: u32 = 64, in 1..=1048576 "";
+        /// Most scatterings of a path (light model `path`); 1 is single scattering.
+        path_scatterings: u32 = 4096, in 1..=1048576 "";
     }
 }
 
@@ -218,6 +243,8 @@ pub struct Params {
     pub high_clouds: HighClouds,
     pub light: Light,
     pub atmosphere: Atmosphere,
+    /// A cloud of the user's own in place of the procedural ones.
+    pub volume: Option<Arc<DensityGrid>>,
 }
 
 impl Params {
@@ -262,7 +289,7 @@ impl Params {
 
 impl Quality {
     /// The numerical methods that have a name. The last three are the published settings of the sources.
-    pub const NAMES: [&str; 6] = ["draft", "balanced", "high", "nubis2015", "thesis2018", "vsu2022"];
+    pub const NAMES: [&str; 7] = ["draft", "balanced", "high", "reference", "nubis2015", "thesis2018", "vsu2022"];
 
     /// The method called `name`.
     pub fn named(name: &str) -> Result<Self> {
@@ -275,11 +302,12 @@ impl Quality {
             big_step: 1,
             light_steps: 5,
             light_distance: 700.0,
+            cone: 0.12,
             ..balanced.clone()
         };
         Ok(match name {
             "balanced" => balanced,
-            "draft" => Self { steps_zenith: 40, steps_horizon: 96, light_steps: 5, cheap_light: 0.0, ..balanced },
+            "draft" => Self { steps_zenith: 40, steps_horizon: 96, light_steps: 5, cheap_light: 0.0, path_samples: 16, ..balanced },
             "high" => Self {
                 steps_zenith: 192,
                 steps_horizon: 512,
@@ -288,8 +316,10 @@ impl Quality {
                 far_sample: false,
                 cheap_light: 1.0,
                 min_transmittance: 0.002,
+                path_samples: 256,
                 ..balanced
             },
+            "reference" => Self { tolerance: 1e-3, path_samples: 1024, view_distance: 1e9, ..balanced },
             // "A sample and five more in a cone"; the sixth is the far one.
             "nubis2015" => published,
             // Options A to D of the text: big steps of three, ten empty samples, light samples always full.
@@ -334,7 +364,7 @@ fn check_block(name: &str, block: &dyn Block) -> Result<()> {
 
 /// A block by the name that Python calls its type: every block of [`Params`], and [`Quality`].
 pub fn block(type_name: &str) -> Option<Box<dyn Block>> {
-    let Params { sun, clouds, weather, wind, high_clouds, light, atmosphere } = Params::default();
+    let Params { sun, clouds, weather, wind, high_clouds, light, atmosphere, volume: _ } = Params::default();
     let quality = Quality::default();
     let blocks: [Box<dyn Block>; 8] = [
         Box::new(sun),

@@ -11,16 +11,19 @@ use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::gpu::{Gpu, Interrupt, Timings, check_fork};
-use crate::kernel::Kernel;
-use crate::params::{Params, Quality};
+use crate::kernel::{Kernel, Variant};
+use crate::params::{Model, Params, Quality};
 use crate::passes::composite::Composed;
 use crate::passes::high_clouds::HighClouds;
+use crate::passes::majorant::Majorants;
 use crate::passes::march::Marched;
 use crate::passes::noise::Noise;
+use crate::passes::rays::Rays;
 use crate::passes::reproject::{History, ORDER, STRIDE};
 use crate::passes::sky::Sky;
+use crate::passes::volume::Volume;
 use crate::passes::weather::Weather;
-use crate::passes::{Bindings, Context, Uniforms, composite, march, points, reproject};
+use crate::passes::{Bindings, Context, Scene, Uniforms, composite, march, path, points, reference, reproject};
 use crate::shader::Linked;
 
 /// Makes pictures of one size with one numerical method on one device.
@@ -31,6 +34,7 @@ pub struct Renderer {
     world: World,
     still: Option<Still>,
     animation: Option<Animation>,
+    refined: Option<Refined>,
     march_pace: Pace,
     pixel_pace: Pace,
     /// Milliseconds on the GPU by kernel, for the last picture or answer.
@@ -48,13 +52,50 @@ pub struct Picture {
     pub depth: Vec<f32>,
     /// Density evaluations, primary and light together.
     pub samples: Vec<u32>,
+    /// Four numbers a pixel: how sure the radiance of the clouds is, and 0. A standard error where paths are traced, the
+    /// change by the last halving where rays converge, nothing where they are marched.
+    pub uncertainty: Vec<f32>,
+}
+
+/// How the clouds of a picture are computed.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Method {
+    /// By so many steps.
+    March,
+    /// By steps that are halved until nothing changes.
+    Reference,
+    /// By tracing paths.
+    Path,
+}
+
+impl Method {
+    fn new(params: &Params, quality: &Quality) -> Self {
+        match params.light.model {
+            Model::Path => Self::Path,
+            _ if quality.tolerance > 0.0 => Self::Reference,
+            _ => Self::March,
+        }
+    }
 }
 
 /// Buffers of the bands of a still, kept from one to the next.
 struct Still {
     pixels: u64,
+    method: Method,
     marched: Marched,
     composed: Composed,
+    rays: Option<Rays>,
+}
+
+/// A picture that every frame of a static shot makes better, where frames are not reprojected.
+struct Refined {
+    camera: Camera,
+    params: Params,
+    time: f64,
+    background: bool,
+    image: Vec<f32>,
+    /// Stills that it is the mean of.
+    count: u32,
 }
 
 /// Buffers of whole pictures, and what reprojection remembers of the frame before.
@@ -91,6 +132,7 @@ impl Renderer {
             world: World::new(&gpu),
             still: None,
             animation: None,
+            refined: None,
             march_pace: pace,
             pixel_pace: pace,
             timings: Timings::default(),
@@ -123,41 +165,74 @@ impl Renderer {
         all: bool,
         interrupt: Interrupt<'_>,
     ) -> Result<Picture> {
+        self.still(camera, params, time, background, all, 0, interrupt)
+    }
+
+    /// A still; `first_sample` is the number of the first path of each pixel.
+    #[expect(clippy::too_many_arguments, reason = "what a still depends on")]
+    fn still(
+        &mut self,
+        camera: &Camera,
+        params: &Params,
+        time: f64,
+        background: bool,
+        all: bool,
+        first_sample: u32,
+        interrupt: Interrupt<'_>,
+    ) -> Result<Picture> {
         let mut frame = self.begin(camera, params, time)?;
         frame.background = u32::from(background);
+        frame.first_sample = first_sample;
+        let method = Method::new(params, &self.quality);
         let Self { gpu, world, quality, timings, .. } = self;
-        let bound = world.run(gpu, params, &frame, quality, timings, interrupt)?;
+        let scene = world.run(gpu, params, &frame, quality, timings, interrupt)?;
 
         let [width, height] = self.size;
         let mut picture = Picture::default();
         while frame.first_row < height {
-            frame.rows = self.march_pace.rows(width, height - frame.first_row);
+            let left = height - frame.first_row;
+            frame.rows = match method {
+                Method::March => self.march_pace.rows(width, left),
+                Method::Reference | Method::Path => (BAND_RAYS / width).clamp(1, left),
+            };
             let pixels = u64::from(width) * u64::from(frame.rows);
-            if self.still.as_ref().is_none_or(|still| still.pixels < pixels) {
-                let (marched, composed) = (Marched::new(gpu, pixels), Composed::new(gpu, pixels));
-                self.still = Some(Still { pixels, marched, composed });
+            if self.still.as_ref().is_none_or(|still| still.pixels < pixels || still.method != method) {
+                self.still = Some(Still::new(gpu, pixels, method));
             }
             let Some(still) = &self.still else { unreachable!("was just made") };
-            bound.uniforms.upload_frame(gpu, &frame);
+            scene.uniforms.upload_frame(gpu, &frame);
 
+            let started = Instant::now();
+            let mut ctx = Context { gpu, uniforms: scene.uniforms, variant: scene.variant, timings, interrupt };
             let mut work = gpu.work();
-            march::run(gpu, &mut work, &bound.all, &frame, &still.marched)?;
-            composite::run(gpu, &mut work, &bound.all, &frame, &still.marched, &still.composed)?;
+            match (method, &still.rays) {
+                (Method::Reference, Some(rays)) => reference::run(&mut ctx, &scene, &frame, rays, &still.marched)?,
+                (Method::Path, Some(rays)) => path::run(&mut ctx, &scene, &frame, rays, &still.marched)?,
+                _ => march::run(gpu, &mut work, &scene, &frame, &still.marched)?,
+            }
+            composite::run(gpu, &mut work, &scene, &frame, &still.marched, &still.composed)?;
             work.download(&still.composed.image, 0, 16 * pixels);
             if all {
                 work.download(&still.composed.sky, 0, 16 * pixels);
                 work.download(&still.composed.depth, 0, 4 * pixels);
                 work.download(&still.marched.samples, 0, 4 * pixels);
+                if let Some(rays) = &still.rays {
+                    work.download(&rays.uncertainty, 0, 16 * pixels);
+                }
             }
-            let started = Instant::now();
             let downloads = work.submit(timings, interrupt)?;
-            self.march_pace.learn(pixels, started);
+            if method == Method::March {
+                self.march_pace.learn(pixels, started);
+            }
 
             picture.image.extend_from_slice(downloads[0].numbers());
             if all {
                 picture.sky.extend_from_slice(downloads[1].numbers());
                 picture.depth.extend_from_slice(downloads[2].numbers());
                 picture.samples.extend_from_slice(downloads[3].numbers());
+                if let Some(uncertainty) = downloads.get(4) {
+                    picture.uncertainty.extend_from_slice(uncertainty.numbers());
+                }
             }
             frame.first_row += frame.rows;
         }
@@ -166,6 +241,8 @@ impl Renderer {
 
     /// The next frame of an animation: a sixteenth of its pixels is marched, the others follow the clouds from the frame
     /// before. The first frame, and the first after a cut, is a still. Returns what [`Renderer::render`] does.
+    ///
+    /// Where rays converge or paths are traced, every frame is a still; a static shot goes on tracing.
     pub fn animate(
         &mut self,
         camera: &Camera,
@@ -174,6 +251,9 @@ impl Renderer {
         background: bool,
         interrupt: Interrupt<'_>,
     ) -> Result<Vec<f32>> {
+        if Method::new(params, &self.quality) != Method::March {
+            return self.refine(camera, params, time, background, interrupt);
+        }
         let mut frame = self.begin(camera, params, time)?;
         frame.background = u32::from(background);
         let [width, height] = self.size;
@@ -207,12 +287,12 @@ impl Renderer {
         // shot keeps the still's, and so becomes the still.
         let round = if frame.moving > 0 { index / 16 } else { 0 };
         frame.jitter_shift = (f64::from(round) * 0.618_033_988_749_895).fract() as f32;
-        let bound = world.run(gpu, params, &frame, quality, timings, interrupt)?;
+        let scene = world.run(gpu, params, &frame, quality, timings, interrupt)?;
 
         if last.is_none() {
-            in_bands(&mut self.march_pace, gpu, &bound, &mut frame, [width, height], |frame| {
+            in_bands(&mut self.march_pace, gpu, &scene, &mut frame, [width, height], |frame| {
                 let mut work = gpu.work();
-                march::run(gpu, &mut work, &bound.all, frame, &animation.now.marched)?;
+                march::run(gpu, &mut work, &scene, frame, &animation.now.marched)?;
                 work.submit(timings, interrupt).map(drop)
             })?;
             gpu.queue.write_buffer(&animation.now.known, 0, bytemuck::cast_slice(&vec![1u32; pixels as usize]));
@@ -220,23 +300,23 @@ impl Renderer {
             frame.stride = STRIDE;
             [frame.subpixel_x, frame.subpixel_y] = ORDER[index as usize % 16];
             frame.march_width = cells[0];
-            in_bands(&mut self.march_pace, gpu, &bound, &mut frame, cells, |frame| {
+            in_bands(&mut self.march_pace, gpu, &scene, &mut frame, cells, |frame| {
                 let mut work = gpu.work();
-                march::run(gpu, &mut work, &bound.all, frame, &animation.fresh)?;
+                march::run(gpu, &mut work, &scene, frame, &animation.fresh)?;
                 work.submit(timings, interrupt).map(drop)
             })?;
-            in_bands(&mut self.pixel_pace, gpu, &bound, &mut frame, [width, height], |frame| {
+            in_bands(&mut self.pixel_pace, gpu, &scene, &mut frame, [width, height], |frame| {
                 let mut work = gpu.work();
                 let Animation { fresh, before, now, .. } = &*animation;
-                reproject::run(gpu, &mut work, &bound.all, frame, fresh, before, now)?;
+                reproject::run(gpu, &mut work, &scene, frame, fresh, before, now)?;
                 work.submit(timings, interrupt).map(drop)
             })?;
         }
         let mut image = Vec::with_capacity(4 * pixels as usize);
-        in_bands(&mut self.pixel_pace, gpu, &bound, &mut frame, [width, height], |frame| {
+        in_bands(&mut self.pixel_pace, gpu, &scene, &mut frame, [width, height], |frame| {
             let mut work = gpu.work();
             let (row, rows) = (u64::from(frame.first_row), u64::from(frame.rows));
-            composite::run(gpu, &mut work, &bound.all, frame, &animation.now.marched, &animation.composed)?;
+            composite::run(gpu, &mut work, &scene, frame, &animation.now.marched, &animation.composed)?;
             work.download(&animation.composed.image, 16 * u64::from(width) * row, 16 * u64::from(width) * rows);
             image.extend_from_slice(work.submit(timings, interrupt)?[0].numbers());
             Ok(())
@@ -247,8 +327,42 @@ impl Renderer {
         Ok(image)
     }
 
+    /// A still, or, of the same shot again, a better one.
+    fn refine(
+        &mut self,
+        camera: &Camera,
+        params: &Params,
+        time: f64,
+        background: bool,
+        interrupt: Interrupt<'_>,
+    ) -> Result<Vec<f32>> {
+        let same = |last: &Refined| {
+            (last.camera, last.time, last.background) == (*camera, time, background) && last.params == *params
+        };
+        let last = self.refined.take().filter(same);
+        let count = last.as_ref().map_or(0, |last| last.count);
+        let image = match last {
+            // What has converged stays.
+            Some(last) if params.light.model != Model::Path => last.image,
+            last => {
+                let first_sample = count.wrapping_mul(self.quality.path_samples);
+                let fresh = self.still(camera, params, time, background, false, first_sample, interrupt)?.image;
+                let share = 1.0 / (count as f32 + 1.0);
+                match last {
+                    Some(last) => last.image.iter().zip(&fresh).map(|(old, new)| old + share * (new - old)).collect(),
+                    None => fresh,
+                }
+            }
+        };
+        let refined =
+            Refined { camera: *camera, params: params.clone(), time, background, image: image.clone(), count: count + 1 };
+        self.refined = Some(refined);
+        Ok(image)
+    }
+
     /// Forgets the frame before: the next one of [`Renderer::animate`] is a still.
     pub fn cut(&mut self) {
+        self.refined = None;
         if let Some(animation) = &mut self.animation {
             animation.last = None;
         }
@@ -291,7 +405,7 @@ impl Renderer {
         let camera = Camera::equirect(eye)?;
         let offset = |p: &[f64; 3]| (DVec3::from_array(*p) - eye).as_vec3().extend(0.0).to_array();
         let points: Vec<_> = at.iter().map(offset).collect();
-        let kernel = self.gpu.kernel("points", entry)?;
+        let kernel = self.gpu.kernel("points", entry, Variant::new(params, &self.quality))?;
         let answers = self.run_points(&kernel, &camera, &points, params, time, interrupt)?;
         Ok(answers.iter().map(|answer| answer[0]).collect())
     }
@@ -317,7 +431,7 @@ impl Renderer {
         );
         let linked =
             Linked::from_source(&source).map_err(|error| Error::parameter("imports", error, "shader names"))?;
-        let kernel = Kernel::from_linked(&self.gpu, &linked, "probe")?;
+        let kernel = Kernel::from_linked(&self.gpu, &linked, "probe", Variant::new(params, &self.quality))?;
         let camera = Camera::equirect(DVec3::ZERO)?;
         self.run_points(&kernel, &camera, inputs, params, time, interrupt)
     }
@@ -333,9 +447,9 @@ impl Renderer {
     ) -> Result<Vec<[f32; 4]>> {
         let frame = self.begin(camera, params, time)?;
         let Self { gpu, world, quality, timings, .. } = self;
-        let bound = world.run(gpu, params, &frame, quality, timings, interrupt)?;
-        let mut ctx = Context { gpu, uniforms: bound.uniforms, timings, interrupt };
-        points::run(&mut ctx, &bound.all, &frame, kernel, points)
+        let scene = world.run(gpu, params, &frame, quality, timings, interrupt)?;
+        let mut ctx = Context { gpu, uniforms: scene.uniforms, variant: scene.variant, timings, interrupt };
+        points::run(&mut ctx, &scene, &frame, kernel, points)
     }
 
     /// Checks the arguments of a call and works out its frame.
@@ -358,12 +472,8 @@ struct World {
     weather: Weather,
     high_clouds: HighClouds,
     sky: Sky,
-}
-
-/// The variables of the world, ready to be bound.
-struct Bound<'a> {
-    uniforms: &'a Uniforms,
-    all: Bindings<'a>,
+    volume: Volume,
+    majorants: Majorants,
 }
 
 impl World {
@@ -379,6 +489,8 @@ impl World {
             weather: Weather::new(),
             high_clouds: HighClouds::new(),
             sky: Sky::new(),
+            volume: Volume::new(),
+            majorants: Majorants::new(),
         }
     }
 
@@ -391,18 +503,42 @@ impl World {
         quality: &Quality,
         timings: &mut Timings,
         interrupt: Interrupt<'_>,
-    ) -> Result<Bound<'_>> {
+    ) -> Result<Scene<'_>> {
         self.uniforms.upload(gpu, params, frame, quality);
-        let mut ctx = Context { gpu, uniforms: &self.uniforms, timings, interrupt };
+        let variant = Variant::new(params, quality);
+        let mut ctx = Context { gpu, uniforms: &self.uniforms, variant, timings, interrupt };
 
         let noise = self.noise.insert(Noise::run(&mut ctx, params)?); // once for a seed
         let weather = self.weather.run(&mut ctx, params)?; // when its block changes
         let high_clouds = self.high_clouds.run(&mut ctx, params, frame)?; // as they evolve
         let sky = self.sky.run(&mut ctx, params, frame)?; // when sun, air or altitude change
 
+        let volume = self.volume.run(&ctx, params)?; // once for a grid
+
         let blue_noise = vec![("blue_noise", (&self.blue_noise).into())];
-        let all = [self.uniforms.bindings(), noise.bindings(), weather, high_clouds, sky, blue_noise].concat();
-        Ok(Bound { uniforms: &self.uniforms, all })
+        let uniforms = self.uniforms.bindings();
+        let mut bindings: Bindings<'_> =
+            [uniforms, noise.bindings(), weather, high_clouds, sky, volume, blue_noise].concat();
+        let majorants = self.majorants.run(&mut ctx, params, &bindings)?; // when paths are traced
+        bindings.extend(majorants);
+        Ok(Scene { uniforms: &self.uniforms, variant, bindings })
+    }
+}
+
+impl Still {
+    fn new(gpu: &Gpu, pixels: u64, method: Method) -> Self {
+        let ray_bytes = match method {
+            Method::March => None,
+            Method::Reference => Some(reference::RAY_BYTES),
+            Method::Path => Some(path::RAY_BYTES),
+        };
+        Self {
+            pixels,
+            method,
+            marched: Marched::new(gpu, pixels),
+            composed: Composed::new(gpu, pixels),
+            rays: ray_bytes.map(|bytes| Rays::new(gpu, pixels, bytes)),
+        }
     }
 }
 
@@ -418,6 +554,7 @@ impl Shot {
             || jumped
             || (old.clouds.seed, old.clouds.noise) != (new.clouds.seed, new.clouds.noise)
             || old.weather != new.weather
+            || old.volume != new.volume
             || old.light.model != new.light.model
             || old.atmosphere.planet_radius != new.atmosphere.planet_radius
     }
@@ -428,6 +565,9 @@ impl Shot {
 const BAND_SECONDS: f64 = 0.1;
 /// Most pixels of a band: 64 MiB a buffer, half of what lavapipe lets a shader see.
 const BAND_PIXELS: u32 = 1 << 22;
+
+/// Most rays that are on their way together where they take many dispatches.
+const BAND_RAYS: u32 = 1 << 14;
 
 /// How many pixels a second buys, from the bands so far.
 #[derive(Clone, Copy)]
@@ -457,7 +597,7 @@ impl Pace {
 fn in_bands(
     pace: &mut Pace,
     gpu: &Gpu,
-    bound: &Bound<'_>,
+    scene: &Scene<'_>,
     frame: &mut Frame,
     [width, height]: [u32; 2],
     mut submit: impl FnMut(&Frame) -> Result<()>,
@@ -466,7 +606,7 @@ fn in_bands(
     while frame.first_row < height {
         frame.rows = pace.rows(width, height - frame.first_row);
         frame.buffer_row = frame.first_row;
-        bound.uniforms.upload_frame(gpu, frame);
+        scene.uniforms.upload_frame(gpu, frame);
         let started = Instant::now();
         submit(frame)?;
         pace.learn(u64::from(width) * u64::from(frame.rows), started);

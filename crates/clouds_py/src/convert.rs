@@ -10,7 +10,7 @@ use numpy::{PyArray1, PyArrayMethods as _, PyReadonlyArray3, PyUntypedArray, PyU
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyInt, PyString, PyTuple};
 
-use crate::exception;
+use crate::{DensityGrid, exception};
 
 /// A value as the parameters know it. What fits no parameter at all comes back as text, which no check lets pass.
 pub fn value_from_python(value: &Bound<'_, PyAny>) -> PyResult<Value> {
@@ -96,6 +96,10 @@ pub fn params_from_python(object: &Bound<'_, PyAny>) -> PyResult<Params> {
     let mut params = Params::default();
     for (name, block) in params.blocks_mut() {
         fill(block, name, &object.getattr(name)?)?;
+    }
+    let volume = object.getattr("volume")?;
+    if !volume.is_none() {
+        params.volume = Some(volume.cast::<DensityGrid>()?.get().0.clone());
     }
     Ok(params)
 }

@@ -5,13 +5,13 @@ mod convert;
 use std::cell::RefCell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 
 use clouds_core::camera::{Camera as CoreCamera, Convention, Projection};
 use clouds_core::gpu::{self, lock};
 use clouds_core::params::{Params, Quality};
 use clouds_core::renderer::Renderer as CoreRenderer;
-use clouds_core::{Error, Result, color, files, params, schema};
+use clouds_core::{DensityGrid as CoreGrid, Error, Result, color, files, params, schema};
 use glam::DVec3;
 use numpy::{PyArray1, PyArrayMethods as _, PyReadonlyArrayDyn, PyUntypedArrayMethods as _};
 use pyo3::prelude::*;
@@ -230,9 +230,9 @@ impl Camera {
     fn __hash__(&self) -> u64 {
         let c = &self.0;
         let numbers = [c.eye, c.right, c.up, c.forward].map(|v| v.to_array());
-        // FNV-1a over the bits; -0.0 equals 0.0, so it hashes as it.
+        // -0.0 equals 0.0, so it hashes as it.
         let bits = numbers.iter().flatten().chain([&c.fov]).map(|v| (v + 0.0).to_bits());
-        bits.fold(c.projection as u64 ^ 0xcbf2_9ce4_8422_2325, |hash, v| (hash ^ v).wrapping_mul(0x0100_0000_01b3))
+        fnv([c.projection as u64].into_iter().chain(bits))
     }
 
     #[staticmethod]
@@ -249,6 +249,98 @@ impl Camera {
         let state = (c.projection as u8, axes[0], axes[1], axes[2], axes[3], c.fov);
         Ok((slf.get_type().getattr("_restore")?, (state,)))
     }
+}
+
+/// A cloud of your own: extinction on a grid.
+///
+/// Parameters
+/// ----------
+/// extinction : array-like of float32, shape (nz, ny, nx)
+///     In 1/m, at the centres of the voxels, trilinear between them; the outermost values hold to the
+///     faces of the box, outside there is nothing.
+/// bounds : ((x0, y0, z0), (x1, y1, z1))
+///     Lowest and highest corner of the box in world metres. It is straight: the planet's curvature
+///     does not bend it, and the wind does not move it.
+#[pyclass(frozen, eq, module = "nubis")]
+#[derive(PartialEq)]
+struct DensityGrid(Arc<CoreGrid>);
+
+#[pymethods]
+impl DensityGrid {
+    #[new]
+    fn new(extinction: &Bound<'_, PyAny>, bounds: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let py = extinction.py();
+        let kwargs = PyDict::new(py);
+        kwargs.set_item("dtype", "float32")?;
+        let refuse = |what: String| {
+            let allowed = "an array of numbers of shape (nz, ny, nx), each from 1 to 2048";
+            exception(py, &Error::parameter("extinction", what, allowed))
+        };
+        let array = py
+            .import("numpy")?
+            .call_method("ascontiguousarray", (extinction,), Some(&kwargs))
+            .map_err(|error| refuse(error.value(py).to_string()))?;
+        let array: PyReadonlyArrayDyn<'_, f32> = array.extract()?;
+        let &[nz, ny, nx] = array.shape() else {
+            return Err(refuse(format!("an array of shape {:?}", array.shape())));
+        };
+        let [low, high] = bounds.extract::<[[f64; 3]; 2]>().map_err(|_| {
+            let given = bounds.str().map_or_else(|_| "?".into(), |text| text.to_string());
+            exception(py, &Error::parameter("bounds", given, "two corners: ((x0, y0, z0), (x1, y1, z1))"))
+        })?;
+        let grid = CoreGrid::new([nx, ny, nz], array.as_slice()?.to_vec(), vector(low), vector(high));
+        Ok(Self(Arc::new(raise(py, grid)?)))
+    }
+
+    /// Extinction in 1/m, float32 of shape (nz, ny, nx): a copy.
+    #[getter]
+    fn extinction<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let [nx, ny, nz] = self.0.size();
+        array(py, self.0.extinction().to_vec(), &[nz, ny, nx])
+    }
+
+    /// Lowest and highest corner in world metres.
+    #[getter]
+    fn bounds(&self) -> ((f64, f64, f64), (f64, f64, f64)) {
+        let [low, high] = self.0.bounds();
+        (low.into(), high.into())
+    }
+
+    /// Shape of the grid: (nz, ny, nx).
+    #[getter]
+    fn shape(&self) -> (usize, usize, usize) {
+        let [nx, ny, nz] = self.0.size();
+        (nz, ny, nx)
+    }
+
+    /// Plain values by name: extinction as nested lists.
+    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let dict = PyDict::new(py);
+        dict.set_item("extinction", self.extinction(py)?.call_method0("tolist")?)?;
+        dict.set_item("bounds", self.0.bounds().map(|corner| corner.to_array()))?;
+        Ok(dict)
+    }
+
+    fn __repr__(&self) -> String {
+        let ((x0, y0, z0), (x1, y1, z1)) = self.bounds();
+        format!("DensityGrid(shape={:?}, bounds=(({x0}, {y0}, {z0}), ({x1}, {y1}, {z1})))", self.shape())
+    }
+
+    fn __hash__(&self) -> u64 {
+        let corners = self.0.bounds().map(|corner| corner.to_array());
+        let bits = corners.iter().flatten().map(|v| (v + 0.0).to_bits());
+        fnv(bits.chain(self.0.extinction().iter().map(|v| u64::from((v + 0.0).to_bits()))))
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyAny>, [[f64; 3]; 2]))> {
+        let corners = slf.get().0.bounds().map(|corner| corner.to_array());
+        Ok((slf.get_type().into_any(), (slf.get().extinction(slf.py())?, corners)))
+    }
+}
+
+/// FNV-1a.
+fn fnv(words: impl Iterator<Item = u64>) -> u64 {
+    words.fold(0xcbf2_9ce4_8422_2325, |hash, v| (hash ^ v).wrapping_mul(0x0100_0000_01b3))
 }
 
 /// A float32 array of `shape` that takes over `data` without a copy.
@@ -333,7 +425,11 @@ impl Renderer {
         let sky = array(py, picture.sky, &self.shape(&[4]))?;
         let depth = array(py, picture.depth, &self.shape(&[]))?;
         let samples = array(py, picture.samples, &self.shape(&[]))?;
-        (image, sky, depth, samples).into_pyobject(py)
+        let uncertainty = match picture.uncertainty {
+            nothing if nothing.is_empty() => py.None().into_bound(py),
+            uncertainty => array(py, uncertainty, &self.shape(&[4]))?,
+        };
+        (image, sky, depth, samples, uncertainty).into_pyobject(py)
     }
 
     fn animate<'py>(
@@ -495,7 +591,7 @@ fn write_hdr(py: Python<'_>, path: PathBuf, frame: PyReadonlyArrayDyn<'_, f32>) 
 mod _nubis {
     #[pymodule_export]
     use super::{
-        Camera, Renderer, adapters, check, check_params, check_quality, quality, to_srgb8, write_exr, write_hdr,
+        Camera, DensityGrid, Renderer, adapters, check, check_params, check_quality, quality, to_srgb8, write_exr, write_hdr,
         write_png,
     };
 }

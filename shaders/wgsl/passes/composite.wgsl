@@ -104,9 +104,11 @@ fn high_layer(direction: vec3f, distance: f32, hit: bool, ground_distance: f32, 
     let slant = max(abs(cos_zenith_at(p, direction)), 0.02);
     let optical_depth = high_optical_depth(p);
     let transmittance = exp(-optical_depth / slant);
-    let phase = model_phase(one_minus_cos(direction, frame.sun_direction));
-    let radiance = phase * sky_light[3].rgb * sun_energy(optical_depth, 0.0)
-        + has_ambient() * params.light.ambient_top * sky_light[0].rgb;
+    let sun = sun_scattering(optical_depth, 0.0, one_minus_cos(direction, frame.sun_direction));
+    var radiance = sun * sky_light[3].rgb;
+    if MODEL != MODEL_SINGLE {
+        radiance += ambient_above();
+    }
     return Layer((1.0 - transmittance) * radiance, transmittance, distance);
 }
 

@@ -80,7 +80,7 @@ fn march_sample(s: Stretches, steps: Steps, direction: vec3f, offset: f32, i: u3
     let begin = step_distance(steps, f32(i));
     let length = step_distance(steps, f32(i + 1u)) - begin;
     let from_start = begin + offset * length;
-    let t = s.start + from_start + select(0.0, s.gap, from_start > s.first);
+    let t = stretch_distance(s, from_start);
     let p = t * direction;
     return Sample(p, t, altitude_at(p), length, max(t * pixel_size, 0.3 * length));
 }
@@ -90,19 +90,15 @@ fn march_ray(direction: vec3f, offset: f32) -> Cloud {
     let room = max(quality.view_distance - stretches.start, 0.0);
     let length = min(stretches.first + stretches.second, room);
     var transmittance = 1.0;
-    if length <= 0.0 || params.clouds.coverage <= 0.0 {
+    if length <= 0.0 || (!VOLUME && params.clouds.coverage <= 0.0) {
         return Cloud(vec3f(0.0), 1.0, -1.0);
     }
     let steps = ray_steps(stretches.start, length, direction);
     let pixel_size = pixel_width();
     let sunlit = any(sky_light[2].rgb > vec3f(0.0));
 
-    // Scalars alone are summed along the ray; colours come once, at its end.
-    var sun = 0.0;
-    var ambient_top = 0.0;
-    var ambient_bottom = 0.0;
-    var weight_sum = 0.0;
-    var distance_sum = 0.0;
+    let one_minus_mu = one_minus_cos(direction, frame.sun_direction);
+    var sum = Gathered();
 
     let big = quality.big_step;
     var i = 0u; // the step at hand
@@ -119,7 +115,7 @@ fn march_ray(direction: vec3f, offset: f32) -> Cloud {
         while i < steps.count && shape <= 0.0 {
             at = march_sample(stretches, steps, direction, offset, i, pixel_size);
             column = cloud_column(at.p, at.altitude);
-            shape = cloud_shape(column, at.altitude, at.width);
+            shape = cloud_shape(column, at.width);
             let searching = empty >= quality.empty_samples;
             if shape <= 0.0 {
                 empty += 1u;
@@ -137,21 +133,17 @@ fn march_ray(direction: vec3f, offset: f32) -> Cloud {
             i += 1u;
             seen = i;
             empty += 1u;
-            let density = cloud_density(column, shape, at.altitude, at.width);
+            let density = cloud_density(column, shape, at.width);
             if density > 0.0 {
                 empty = 0u;
-                let x = density * params.clouds.extinction * at.length;
+                let x = density * frame.extinction * at.length;
                 let weight = transmittance * x * one_minus_exp_over(x);
                 var depth_to_sun = 0.0;
                 if sunlit {
                     depth_to_sun = optical_depth_to_sun(at.p, 1.0 - transmittance, at.width);
                 }
-                let above = ambient_share(column.height);
-                sun += weight * sun_energy(depth_to_sun, column.precipitation);
-                ambient_top += weight * above;
-                ambient_bottom += weight * (1.0 - above);
-                weight_sum += weight;
-                distance_sum += weight * at.t;
+                let sun = sun_scattering(depth_to_sun, column.precipitation, one_minus_mu);
+                sum = gather(sum, weight, sun, column.height, at.t);
                 transmittance *= exp(-x);
                 if transmittance < quality.min_transmittance {
                     i = steps.count;
@@ -159,7 +151,7 @@ fn march_ray(direction: vec3f, offset: f32) -> Cloud {
             }
         }
     }
-    if weight_sum <= 0.0 {
+    if sum.weight <= 0.0 {
         return Cloud(vec3f(0.0), 1.0, -1.0);
     }
 
@@ -169,9 +161,5 @@ fn march_ray(direction: vec3f, offset: f32) -> Cloud {
         scale = 1.0 / (1.0 - transmittance);
         transmittance = 0.0;
     }
-    let phase = model_phase(one_minus_cos(direction, frame.sun_direction));
-    let radiance = phase * sun * sky_light[2].rgb
-        + has_ambient() * (ambient_top * params.light.ambient_top * sky_light[0].rgb
-        + ambient_bottom * params.light.ambient_bottom * sky_light[1].rgb);
-    return Cloud(scale * radiance, transmittance, distance_sum / weight_sum);
+    return Cloud(scale * gathered_radiance(sum), transmittance, sum.distance / sum.weight);
 }

@@ -2,6 +2,7 @@
 #import bindings
 #import shell
 #import density
+#import panels
 #import high_layer
 
 // Extinction in 1/m, the field that `march` marches.
@@ -12,13 +13,11 @@ fn extinction_at_points(@builtin(global_invocation_id) id: vec3u) {
     }
     let p = points[id.x].xyz;
     let altitude = altitude_at(p);
-    results[id.x] = vec4f(cloud_density_at(p, altitude, 0.0) * params.clouds.extinction, 0.0, 0.0, 0.0);
+    results[id.x] = vec4f(cloud_density_at(p, altitude, 0.0) * frame.extinction, 0.0, 0.0, 0.0);
 }
 
-// Step of the march toward the sun, m: half a texel of the base shape at its default scale.
-const SUN_STEP = 20.0;
 // So that lavapipe's limit of 65,535 iterations over a shader is never met (hazard 21).
-const MAX_SUN_STEPS = 8192.0;
+const MAX_SUN_PANELS = 16384u;
 
 @compute @workgroup_size(64)
 fn sun_transmittance_at_points(@builtin(global_invocation_id) id: vec3u) {
@@ -26,38 +25,25 @@ fn sun_transmittance_at_points(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let p = points[id.x].xyz;
-    let h = altitude_at(p);
-    let radius = params.atmosphere.planet_radius;
-    let b = (radius + h) * cos_zenith_at(p, frame.sun_direction);
-    let top = params.clouds.top;
-    let base = params.clouds.base;
-    let high = params.high_clouds.altitude;
-    let ground = crossing(b, h * (2.0 * radius + h));
-    if ground.enters {
+    if hit_sphere_from(p, frame.sun_direction, 0.0).enters {
         results[id.x] = vec4f(0.0);
         return;
     }
-    let s = stretches_between(
-        crossing(b, (h - top) * (2.0 * radius + h + top)),
-        crossing(b, (h - base) * (2.0 * radius + h + base)),
-        Hit(0.0, 0.0, false, false),
-    );
+    let s = cloud_stretches_from(p, frame.sun_direction);
     let length = s.first + s.second;
-    let steps = clamp(ceil(length / SUN_STEP), 1.0, MAX_SUN_STEPS);
+    // At least so long that they suffice.
+    let longest = max(2.0 * finest_feature(), length / f32(MAX_SUN_PANELS));
     var depth = 0.0;
-    if length > 0.0 {
-        for (var i = 0.0; i < steps; i += 1.0) {
-            let from_start = (i + 0.5) / steps * length;
-            let t = s.start + from_start + select(0.0, s.gap, from_start > s.first);
-            let q = p + t * frame.sun_direction;
-            depth += cloud_density_at(q, altitude_at(q), 0.0);
-        }
-        depth *= params.clouds.extinction * length / steps;
+    var x = 0.0;
+    for (var i = 0u; i < 2u * MAX_SUN_PANELS && x < length; i++) {
+        let panel = panel_from(p, frame.sun_direction, s, x, min(longest, length - x));
+        depth += panel_depth(panel, read_panel(panel, p, frame.sun_direction, s, 0.0).density);
+        x = panel.end;
     }
-    let layer = crossing(b, (h - high) * (2.0 * radius + h + high));
-    if layer.hit && params.high_clouds.coverage > 0.0 {
+    let high = hit_sphere_from(p, frame.sun_direction, params.high_clouds.altitude);
+    if high.hit && params.high_clouds.coverage > 0.0 {
         for (var side = 0; side < 2; side++) {
-            let t = select(layer.far, layer.near, side == 0);
+            let t = select(high.far, high.near, side == 0);
             let q = p + t * frame.sun_direction;
             let slant = max(abs(cos_zenith_at(q, frame.sun_direction)), 0.02);
             depth += select(0.0, high_optical_depth(q) / slant, t > 0.0);

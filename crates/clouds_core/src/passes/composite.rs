@@ -1,6 +1,6 @@
 //! The clouds before the sky: what the caller gets.
 
-use super::Bindings;
+use super::Scene;
 use super::march::Marched;
 use crate::error::Result;
 use crate::frame::Frame;
@@ -30,12 +30,12 @@ impl Composed {
 pub(crate) fn run(
     gpu: &Gpu,
     work: &mut Work<'_>,
-    world: &Bindings<'_>,
+    scene: &Scene<'_>,
     frame: &Frame,
     marched: &Marched,
     out: &Composed,
 ) -> Result<()> {
     let ours = [("image", (&out.image).into()), ("sky", (&out.sky).into()), ("depth", (&out.depth).into())];
-    let bindings = [world.as_slice(), &marched.bindings(), &ours].concat();
-    work.dispatch(&*gpu.kernel("composite", "composite")?, &bindings, [frame.width, frame.rows, 1])
+    let bindings = [scene.bindings.as_slice(), &marched.bindings(), &ours].concat();
+    work.dispatch(&*gpu.kernel("composite", "composite", scene.variant)?, &bindings, [frame.width, frame.rows, 1])
 }

@@ -1,6 +1,6 @@
 //! The march through the clouds, of every pixel or of a subset.
 
-use super::Bindings;
+use super::{Bindings, Scene};
 use crate::error::Result;
 use crate::frame::Frame;
 use crate::gpu::{Gpu, Work};
@@ -33,8 +33,8 @@ impl Marched {
     }
 }
 
-/// Marches the band of `frame` through the `world` (uniforms, noises, maps, sky).
-pub(crate) fn run(gpu: &Gpu, work: &mut Work<'_>, world: &Bindings<'_>, frame: &Frame, out: &Marched) -> Result<()> {
-    let bindings = [world.as_slice(), &out.bindings()].concat();
-    work.dispatch(&*gpu.kernel("march", "march")?, &bindings, [frame.march_width, frame.rows, 1])
+/// Marches the band of `frame` through the `scene`.
+pub(crate) fn run(gpu: &Gpu, work: &mut Work<'_>, scene: &Scene<'_>, frame: &Frame, out: &Marched) -> Result<()> {
+    let bindings = [scene.bindings.as_slice(), &out.bindings()].concat();
+    work.dispatch(&*gpu.kernel("march", "march", scene.variant)?, &bindings, [frame.march_width, frame.rows, 1])
 }

@@ -2,29 +2,42 @@
 
 pub mod composite;
 pub mod high_clouds;
+pub mod majorant;
 pub mod march;
 pub mod noise;
+pub mod path;
 pub mod points;
+pub mod rays;
+pub mod reference;
 pub mod reproject;
 pub mod sky;
+pub mod volume;
 pub mod weather;
 
 use crate::error::Result;
 use crate::frame::Frame;
 use crate::gpu::{Gpu, Interrupt, Timings};
-use crate::kernel::Binding;
+use crate::kernel::{Binding, Variant};
 use crate::params::{self, Params, Quality};
 use crate::schema::{self, Block as _};
 
 /// The variables that a kernel may use, by name.
 pub(crate) type Bindings<'a> = Vec<(&'static str, Binding<'a>)>;
 
-/// What every pass needs: the device, the uniform blocks, and where time and interrupts go.
+/// What every pass needs: the device, the uniform blocks, which pipelines, and where time and interrupts go.
 pub(crate) struct Context<'a> {
     pub gpu: &'a Gpu,
     pub uniforms: &'a Uniforms,
+    pub variant: Variant,
     pub timings: &'a mut Timings,
     pub interrupt: Interrupt<'a>,
+}
+
+/// Everything that a march can read, ready to be bound, and the pipelines that it asks for.
+pub(crate) struct Scene<'a> {
+    pub uniforms: &'a Uniforms,
+    pub variant: Variant,
+    pub bindings: Bindings<'a>,
 }
 
 /// The uniform blocks on the GPU.

@@ -64,8 +64,8 @@ fn volume(ctx: &mut Context<'_>, entry: &str, size: u32) -> Result<wgpu::Texture
     let out = mip(0);
     let mut bindings = ctx.uniforms.bindings();
     bindings.push(("volume_out", (&out).into()));
-    work.dispatch(&*ctx.gpu.kernel("noise", entry)?, &bindings, [size; 3])?;
-    let downsample = ctx.gpu.kernel("noise", "downsample")?;
+    work.dispatch(&*ctx.gpu.kernel("noise", entry, ctx.variant)?, &bindings, [size; 3])?;
+    let downsample = ctx.gpu.kernel("noise", "downsample", ctx.variant)?;
     for level in 1..mips {
         let (from, to) = (mip(level - 1), mip(level));
         let bindings = [("volume_in", (&from).into()), ("volume_out", (&to).into())];

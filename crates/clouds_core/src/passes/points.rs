@@ -1,6 +1,6 @@
 //! Answers at points, and probes of single shader functions.
 
-use super::{Bindings, Context};
+use super::{Context, Scene};
 use crate::error::Result;
 use crate::frame::Frame;
 use crate::kernel::Kernel;
@@ -11,7 +11,7 @@ const CHUNK: usize = 1 << 14;
 /// Runs `kernel` over points (four numbers each), whatever it makes of them.
 pub(crate) fn run(
     ctx: &mut Context<'_>,
-    world: &Bindings<'_>,
+    scene: &Scene<'_>,
     frame: &Frame,
     kernel: &Kernel,
     points: &[[f32; 4]],
@@ -22,7 +22,7 @@ pub(crate) fn run(
         let (given, answers) = (ctx.gpu.buffer("points", bytes), ctx.gpu.buffer("results", bytes));
         ctx.gpu.queue.write_buffer(&given, 0, bytemuck::cast_slice(chunk));
         ctx.uniforms.upload_frame(ctx.gpu, &Frame { width: chunk.len() as u32, ..frame.clone() });
-        let bindings = [world.as_slice(), &[("points", (&given).into()), ("results", (&answers).into())]].concat();
+        let bindings = [scene.bindings.as_slice(), &[("points", (&given).into()), ("results", (&answers).into())]].concat();
         let mut work = ctx.gpu.work();
         work.dispatch(kernel, &bindings, [chunk.len() as u32, 1, 1])?;
         work.download(&answers, 0, bytes);

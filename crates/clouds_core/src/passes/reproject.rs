@@ -1,6 +1,6 @@
 //! Temporal reprojection: one pixel in sixteen is marched, the others come from the frame before.
 
-use super::Bindings;
+use super::Scene;
 use super::march::Marched;
 use crate::error::Result;
 use crate::frame::Frame;
@@ -47,7 +47,7 @@ impl History {
 pub(crate) fn run(
     gpu: &Gpu,
     work: &mut Work<'_>,
-    world: &Bindings<'_>,
+    scene: &Scene<'_>,
     frame: &Frame,
     fresh: &Marched,
     before: &History,
@@ -61,6 +61,6 @@ pub(crate) fn run(
         ("history_known", (&before.known).into()),
         ("known", (&out.known).into()),
     ];
-    let bindings = [world.as_slice(), &out.marched.bindings(), &ours].concat();
-    work.dispatch(&*gpu.kernel("reproject", "reproject")?, &bindings, [frame.width, frame.rows, 1])
+    let bindings = [scene.bindings.as_slice(), &out.marched.bindings(), &ours].concat();
+    work.dispatch(&*gpu.kernel("reproject", "reproject", scene.variant)?, &bindings, [frame.width, frame.rows, 1])
 }

@@ -32,7 +32,7 @@ impl Sky {
             let mut bindings = ctx.uniforms.bindings();
             bindings.push(("sky_light", (&light).into()));
             let mut work = ctx.gpu.work();
-            work.dispatch(&*ctx.gpu.kernel("sky", "sky_light_bake")?, &bindings, [64, 1, 1])?;
+            work.dispatch(&*ctx.gpu.kernel("sky", "sky_light_bake", ctx.variant)?, &bindings, [64, 1, 1])?;
             work.submit(ctx.timings, ctx.interrupt)?;
             Ok((map.create_view(&wgpu::TextureViewDescriptor::default()), light))
         })?;

@@ -8,6 +8,11 @@ use crate::schema::Map;
 /// Texels of a baked map's side (nubis2015).
 const SIZE: u32 = 512;
 
+/// Width and height of the map in texels.
+pub(crate) fn size(weather: &params::Weather) -> [u32; 2] {
+    weather.map.as_ref().map_or([SIZE; 2], |map| [map.width as u32, map.height as u32])
+}
+
 /// The weather map on the GPU.
 pub(crate) struct Weather {
     map: Baked<params::Weather, wgpu::TextureView>,
@@ -49,7 +54,7 @@ pub(crate) fn bake_map(ctx: &mut Context<'_>, pass: &str, entry: &str, texture: 
     let mut bindings = ctx.uniforms.bindings();
     bindings.push(("map_out", (&out).into()));
     let mut work = ctx.gpu.work();
-    work.dispatch(&*ctx.gpu.kernel(pass, entry)?, &bindings, [texture.width(), texture.height(), 1])?;
+    work.dispatch(&*ctx.gpu.kernel(pass, entry, ctx.variant)?, &bindings, [texture.width(), texture.height(), 1])?;
     work.submit(ctx.timings, ctx.interrupt)?;
     Ok(())
 }

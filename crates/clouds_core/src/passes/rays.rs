@@ -1,0 +1,78 @@
+//! Rays that take more steps than one dispatch may: those that are not done go on in the next one.
+
+use std::time::Instant;
+
+use super::{Bindings, Context, Scene};
+use crate::error::{Error, Result};
+use crate::frame::Frame;
+use crate::gpu::Gpu;
+use crate::kernel::Kernel;
+
+/// Most turns of a dispatch: with the loops inside one, lavapipe's limit of 65,535 over a shader is far (hazard 21).
+const MOST_TURNS: u32 = 2048;
+/// What a dispatch should take, in seconds.
+const SECONDS: f64 = 0.1;
+
+/// The buffers of a band of rays.
+pub(crate) struct Rays {
+    pub state: wgpu::Buffer,
+    active: wgpu::Buffer,
+    progress: wgpu::Buffer,
+    pub uncertainty: wgpu::Buffer,
+}
+
+impl Rays {
+    pub fn new(gpu: &Gpu, rays: u64, state_bytes: u64) -> Self {
+        Self {
+            state: gpu.buffer("rays", state_bytes * rays),
+            active: gpu.buffer("active_rays", 4 * rays),
+            progress: gpu.buffer("progress", 8 * rays),
+            uncertainty: gpu.buffer("uncertainty", 16 * rays),
+        }
+    }
+
+    /// Runs `kernel` until every one of `rays` is done. `state` is the variable that the rays are kept in.
+    pub fn run(
+        &self,
+        ctx: &mut Context<'_>,
+        scene: &Scene<'_>,
+        frame: &Frame,
+        kernel: &Kernel,
+        state: &'static str,
+        outputs: &Bindings<'_>,
+        rays: u32,
+    ) -> Result<()> {
+        let mut clear = ctx.gpu.work();
+        clear.clear(&self.state);
+        clear.submit(ctx.timings, ctx.interrupt)?;
+        let ours = [
+            (state, (&self.state).into()),
+            ("active_rays", (&self.active).into()),
+            ("progress", (&self.progress).into()),
+            ("uncertainty", (&self.uncertainty).into()),
+        ];
+        let bindings = [scene.bindings.as_slice(), outputs, &ours].concat();
+        let mut active: Vec<u32> = (0..rays).collect();
+        let mut budget = 32;
+        while !active.is_empty() {
+            let count = active.len() as u32;
+            ctx.gpu.queue.write_buffer(&self.active, 0, bytemuck::cast_slice(&active));
+            scene.uniforms.upload_frame(ctx.gpu, &Frame { active_rays: count, budget, ..frame.clone() });
+            let mut work = ctx.gpu.work();
+            work.dispatch(kernel, &bindings, [count, 1, 1])?;
+            work.download(&self.progress, 0, 8 * u64::from(count));
+            let started = Instant::now();
+            let downloads = work.submit(ctx.timings, ctx.interrupt)?;
+            let progress: &[[u32; 2]] = downloads[0].numbers();
+            // A driver that ends loops by itself must not pass for convergence.
+            if let Some([turns, _]) = progress.iter().find(|[turns, done]| *done == 0 && *turns != budget) {
+                let what = format!("{} ended a loop after {turns} of {budget} turns", ctx.gpu.info.name);
+                return Err(Error::Device(format!("{what}: its results cannot be trusted")));
+            }
+            active = active.iter().zip(progress).filter(|(_, [_, done])| *done == 0).map(|(ray, _)| *ray).collect();
+            let pace = SECONDS / started.elapsed().as_secs_f64().max(1e-6);
+            budget = ((f64::from(budget) * pace.clamp(0.25, 4.0)) as u32).clamp(16, MOST_TURNS);
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,33 @@
+// What the density near a point never exceeds: what delta tracking steps by (Woodcock et al. 1965).
+#import bindings
+#import density
+
+// Voxels of the user's grid along the side of a cell.
+const BRICK = 4u;
+
+struct Majorant {
+    density: f32, // never exceeded within `reach` of the point
+    reach: f32, // m
+}
+
+// Of a point between base and top, or in the box.
+fn majorant_at(p: vec3f, altitude: f32) -> Majorant {
+    let size = vec3f(textureDimensions(majorants));
+    var cell: vec3f;
+    var reach: f32;
+    if VOLUME {
+        cell = (volume_cell(p) + 0.5) / f32(BRICK);
+        reach = f32(BRICK) * frame.voxel;
+    } else {
+        let thickness = params.clouds.top - params.clouds.base;
+        let height = (altitude - params.clouds.base) / thickness;
+        let at = p.xy - height * params.wind.shear * frame.wind_direction;
+        let uv = frame.weather_origin + vec2f(at.x, -at.y) / params.weather.extent;
+        cell = vec3f(uv - floor(uv), height) * size;
+        // Going up a metre also goes sideways in the map, by the wind's lean.
+        let lean = abs(params.wind.shear) / thickness;
+        reach = min(params.weather.extent / max(size.x, size.y) / (1.0 + lean), thickness / size.z);
+    }
+    let texel = vec3i(clamp(floor(cell), vec3f(0.0), size - 1.0));
+    return Majorant(textureLoad(majorants, texel, 0).r, reach);
+}

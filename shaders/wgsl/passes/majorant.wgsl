@@ -1,0 +1,88 @@
+// Bakes majorants: the largest density in each cell of the weather map by height, or of the user's grid; then the largest
+// of each cell and its neighbours, so that a step as long as a cell is safe from anywhere in it.
+#import bindings
+#import density
+#import majorant
+
+// Half floats round by up to 2^-11: up, then, by more than that.
+const ROUND_UP = 1.001;
+
+// The largest voxel of a brick and of those that its edge is interpolated with.
+@compute @workgroup_size(4, 4, 4)
+fn majorant_grid(@builtin(global_invocation_id) id: vec3u) {
+    if any(id >= textureDimensions(volume_out)) {
+        return;
+    }
+    let last = vec3i(textureDimensions(volume_exact)) - 1;
+    let corner = vec3i(id * BRICK) - 1;
+    const SIDE = i32(BRICK) + 2;
+    var most = 0.0;
+    for (var i = 0; i < SIDE * SIDE * SIDE; i++) {
+        let at = clamp(corner + vec3i(i % SIDE, i / SIDE % SIDE, i / (SIDE * SIDE)), vec3i(0), last);
+        most = max(most, textureLoad(volume_exact, at, 0).r);
+    }
+    textureStore(volume_out, id, vec4f(ROUND_UP * most));
+}
+
+// No noise is above 1, so what bounds the density is profile and coverage: the largest of each, of all the weather that
+// a cell's points can read.
+@compute @workgroup_size(4, 4, 4)
+fn majorant_weather(@builtin(global_invocation_id) id: vec3u) {
+    let size = textureDimensions(volume_out);
+    if any(id >= size) {
+        return;
+    }
+    let map = vec2f(textureDimensions(weather_map));
+    let low = vec2i(floor(vec2f(id.xy) / vec2f(size.xy) * map - 0.5));
+    let high = vec2i(ceil(vec2f(id.xy + 1u) / vec2f(size.xy) * map - 0.5));
+    var most = vec3f(0.0);
+    var least = vec3f(1.0);
+    for (var y = low.y; y <= high.y; y++) {
+        for (var x = low.x; x <= high.x; x++) {
+            let texel = textureLoad(weather_map, wrapped(vec2i(x, y), vec2i(map)), 0).rgb;
+            most = max(most, texel);
+            least = min(least, texel);
+        }
+    }
+    let wettest = weather_from_map(most);
+    let kinds = vec2f(weather_from_map(least).kind, wettest.kind);
+    let heights = vec2f(f32(id.z), f32(id.z + 1u)) / f32(size.z);
+    let bound = with_coverage(largest_profile(heights, kinds), wettest.coverage);
+    textureStore(volume_out, id, vec4f(ROUND_UP * bound));
+}
+
+fn wrapped(at: vec2i, size: vec2i) -> vec2i {
+    return ((at % size) + size) % size;
+}
+
+// The largest value of `height_profile` between two heights and two types.
+fn largest_profile(heights: vec2f, kinds: vec2f) -> f32 {
+    // Where the profile rises and falls goes from stratus to stratocumulus to cumulus in straight lines.
+    let middle = clamp(0.5, kinds.x, kinds.y);
+    let a = profile_edges(kinds.x);
+    let b = profile_edges(middle);
+    let c = profile_edges(kinds.y);
+    let first = min(min(a, b), c);
+    let last = max(max(a, b), c);
+    // It rises to at most that of the earliest rise at the upper height, and falls at least that of the latest fall at
+    // the lower one.
+    return remap01(heights.y, first.x, first.y) * (1.0 - smoothstep(last.z, last.w, heights.x));
+}
+
+// The largest of a cell and its neighbours. The weather map repeats.
+@compute @workgroup_size(4, 4, 4)
+fn majorant_dilate(@builtin(global_invocation_id) id: vec3u) {
+    let size = vec3i(textureDimensions(volume_out));
+    if any(vec3i(id) >= size) {
+        return;
+    }
+    var most = 0.0;
+    for (var i = 0; i < 27; i++) {
+        var at = vec3i(id) + vec3i(i % 3, i / 3 % 3, i / 9) - 1;
+        if !VOLUME {
+            at = vec3i(wrapped(at.xy, size.xy), at.z);
+        }
+        most = max(most, textureLoad(volume_in, clamp(at, vec3i(0), size - 1), 0).r);
+    }
+    textureStore(volume_out, id, vec4f(most));
+}

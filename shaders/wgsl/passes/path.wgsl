@@ -1,0 +1,221 @@
+// Traces paths of light from each pixel through every order of scattering: delta tracking from collision to collision,
+// ratio tracking toward the sun from each (Novák et al. 2018), sky and ground for the light around.
+//
+// One loop whose every turn is one step of one flight: no path waits for another, and a pixel can stop after any turn and
+// go on in the next dispatch.
+#import bindings
+#import camera
+#import majorant
+#import light
+#import random
+#import atmosphere
+
+// Stages of a pixel.
+const START = 0u; // of a path
+const FLIGHT = 1u; // of light, backward, to its next collision
+const SHADOW = 2u; // toward the sun, from a collision
+const GROUND = 3u; // toward the sun, from the ground
+const DONE = 4u;
+
+// The shortest step, m: less than a thousandth of what light goes freely in the densest cloud, and more than positions are
+// rounded by, so that a flight ends whatever the extinction.
+const SHORTEST = 1e-3;
+// Below it a path goes on by chance alone, with the weight of those that end (Russian roulette).
+const FAINT = 0.1;
+
+@compute @workgroup_size(64)
+fn path(@builtin(global_invocation_id) id: vec3u) {
+    if id.x >= frame.active_rays {
+        return;
+    }
+    let index = active_rays[id.x];
+    let pixel = vec2u(index % frame.width, frame.first_row + index / frame.width);
+    let view = view_direction(vec2f(pixel) + 0.5);
+    let pixel_size = pixel_width();
+    let sunlit = any(sky_light[2].rgb > vec3f(0.0));
+
+    var ray = path_rays[index];
+    evaluations = ray.evaluations;
+    var turns = 0u;
+    for (; turns < frame.budget && ray.stage != DONE; turns++) {
+        if ray.stage == START {
+            ray.origin = vec3f(0.0);
+            ray.direction = view.xyz;
+            ray.flight = view_flight(view);
+            ray.x = 0.0;
+            ray.throughput = vec3f(1.0);
+            ray.light = vec3f(0.0);
+            ray.scatterings = 0u;
+            ray.draws = 0u;
+            ray.stage = FLIGHT;
+        }
+        let u = draw(&ray, pixel);
+
+        // A step: to a collision that is real or not, or as far as the majorant holds.
+        let s = Stretches(ray.flight.x, ray.flight.y, ray.flight.z, ray.flight.w);
+        let length = s.first + s.second;
+        let direction = select(frame.sun_direction, ray.direction, ray.stage == FLIGHT);
+        let from = ray.origin + stretch_distance(s, ray.x) * direction;
+        let majorant = majorant_at(from, altitude_at(from));
+        let free = max(-log(1.0 - u.x) / max(majorant.density * frame.extinction, 1e-30), SHORTEST);
+        let before_gap = ray.x < s.first && s.second > 0.0;
+        let room = select(length, s.first, before_gap) - ray.x;
+        // Never without progress, whatever is rounded.
+        let reach = max(majorant.reach, 4e-7 * (s.start + ray.x) + SHORTEST);
+        let collides = free < min(reach, room);
+        // The end is reached exactly, and the gap left behind.
+        let edge = select(length, s.first + SHORTEST + 4e-7 * s.first, before_gap);
+        ray.x = select(select(edge, ray.x + reach, reach < room), ray.x + free, collides);
+        let t = stretch_distance(s, ray.x);
+        let p = ray.origin + t * direction;
+        if ray.scatterings == 0u {
+            ray.width = t * pixel_size;
+        }
+        let density = cloud_density_at(p, altitude_at(p), ray.width);
+        let real = select(0.0, saturate(density / max(majorant.density, 1e-30)), collides);
+        let ends = ray.x >= length;
+
+        if ray.stage == FLIGHT {
+            if real > u.y {
+                ray.scatterings += 1u;
+                ray.throughput *= params.light.albedo;
+                ray.distance += select(0.0, t, ray.scatterings == 1u);
+                ray.origin = p;
+                ray.x = 0.0;
+                if ray.scatterings > quality.path_scatterings {
+                    ray = path_ended(ray);
+                } else if sunlit {
+                    let phase = henyey_greenstein(one_minus_cos(direction, frame.sun_direction), params.light.g);
+                    ray.sunlight = ray.throughput * phase * sky_light[2].rgb;
+                    ray.shadow = 1.0;
+                    ray.flight = flight_from(p, frame.sun_direction);
+                    ray.stage = SHADOW;
+                } else {
+                    ray = scattered_on(ray, pixel);
+                }
+            } else if ends {
+                ray = escaped(ray, pixel);
+            }
+        } else {
+            ray.shadow *= 1.0 - real;
+            if ray.shadow < FAINT && ray.shadow > 0.0 && real > 0.0 {
+                ray.shadow = select(0.0, FAINT, u.y * FAINT < ray.shadow);
+            }
+            if ends || ray.shadow <= 0.0 {
+                ray.light += ray.shadow * ray.sunlight;
+                ray = scattered_on(ray, pixel);
+            }
+        }
+        if ray.stage == START && ray.done >= quality.path_samples {
+            write_pixel(ray, index);
+            ray.stage = DONE;
+        }
+    }
+    ray.evaluations = evaluations;
+    path_rays[index] = ray;
+    progress[id.x] = vec2u(turns, select(0u, 1u, ray.stage == DONE));
+}
+
+// Three random numbers in [0, 1), never the same for two pixels, paths or turns.
+fn draw(ray: ptr<function, PathRay>, pixel: vec2u) -> vec3f {
+    (*ray).draws += 1u;
+    return random3(vec3u(pixel.y * frame.width + pixel.x, frame.first_sample + (*ray).done, (*ray).draws), 0u);
+}
+
+fn view_flight(view: vec4f) -> vec4f {
+    let s = cloud_stretches(view.xyz);
+    let room = max(quality.view_distance - s.start, 0.0);
+    let clear = view.w == 0.0 || (!VOLUME && params.clouds.coverage <= 0.0);
+    let first = min(s.first, room);
+    let cut = vec4f(s.start, first, s.gap, min(s.second, room - first));
+    return select(cut, vec4f(0.0), clear);
+}
+
+// The stretches of a flight that starts at a point, to the ground at most.
+fn flight_from(p: vec3f, direction: vec3f) -> vec4f {
+    let ground = hit_sphere_from(p, direction, 0.0);
+    var s = cloud_stretches_from(p, direction);
+    if ground.enters {
+        let first = clamp(ground.near - s.start, 0.0, s.first);
+        let second = clamp(ground.near - s.start - s.first - s.gap, 0.0, s.second);
+        s = Stretches(s.start, first, s.gap, second);
+    }
+    return vec4f(s.start, s.first, s.gap, s.second);
+}
+
+// On from a collision, or from the ground.
+fn scattered_on(given: PathRay, pixel: vec2u) -> PathRay {
+    var ray = given;
+    let u = draw(&ray, pixel);
+    let brightest = max(max(ray.throughput.r, ray.throughput.g), ray.throughput.b);
+    if brightest < FAINT {
+        if u.z * FAINT >= brightest {
+            return path_ended(ray);
+        }
+        ray.throughput *= FAINT / brightest;
+    }
+    if ray.stage == GROUND {
+        // By Lambert's law about the local zenith.
+        let up = normalize(frame.zenith * frame.centre_distance + ray.origin);
+        let side = perpendicular(up);
+        let angle = 2.0 * PI * u.y - PI;
+        let level = cos(angle) * side + sin(angle) * cross(up, side);
+        ray.direction = normalize(sqrt(1.0 - u.x) * up + sqrt(u.x) * level);
+    } else {
+        ray.direction = scattered(ray.direction, params.light.g, u.xy);
+    }
+    ray.flight = flight_from(ray.origin, ray.direction);
+    ray.x = 0.0;
+    ray.stage = FLIGHT;
+    return ray;
+}
+
+// Out of the clouds: to the eye's background if it met none, else to the sky or to the ground.
+fn escaped(given: PathRay, pixel: vec2u) -> PathRay {
+    var ray = given;
+    if ray.scatterings == 0u {
+        ray.seen += 1.0;
+        return path_ended(ray);
+    }
+    ray.light += ray.throughput * params.light.ambient;
+    if params.atmosphere.enabled == 0u {
+        return path_ended(ray);
+    }
+    let ground = hit_sphere_from(ray.origin, ray.direction, 0.0);
+    if !ground.enters {
+        ray.light += ray.throughput * params.light.ambient_gain * sky_radiance(ray.direction);
+        return path_ended(ray);
+    }
+    ray.scatterings += 1u;
+    if ray.scatterings > quality.path_scatterings {
+        return path_ended(ray);
+    }
+    ray.origin += ground.near * ray.direction;
+    ray.throughput *= params.atmosphere.ground_albedo;
+    let mu = max(cos_zenith_at(ray.origin, frame.sun_direction), 0.0);
+    ray.sunlight = ray.throughput / PI * mu * sun_irradiance(0.0, mu);
+    ray.shadow = select(0.0, 1.0, mu > 0.0);
+    ray.flight = flight_from(ray.origin, frame.sun_direction);
+    ray.x = 0.0;
+    ray.stage = GROUND;
+    return ray;
+}
+
+fn path_ended(given: PathRay) -> PathRay {
+    var ray = given;
+    ray.radiance += ray.light;
+    ray.squares += ray.light * ray.light;
+    ray.done += 1u;
+    ray.stage = START;
+    return ray;
+}
+
+fn write_pixel(ray: PathRay, index: u32) {
+    let n = f32(ray.done);
+    let mean = ray.radiance / n;
+    let variance = max(ray.squares / n - mean * mean, vec3f(0.0));
+    clouds[index] = vec4f(mean, ray.seen / n);
+    cloud_depth[index] = select(-1.0, ray.distance / max(n - ray.seen, 1.0), ray.seen < n);
+    samples[index] = evaluations;
+    uncertainty[index] = vec4f(sqrt(variance / (n - 1.0)), 0.0);
+}

@@ -1,0 +1,192 @@
+// Integrates each pixel's ray until it has converged: the same field and light as `march`, panels halved until that
+// changes nothing, sun rays to the end of the clouds (docs/accuracy.md).
+//
+// One loop whose every turn reads one panel, of the view ray or of a sun ray: no ray waits for another, and a ray can
+// stop after any turn and go on in the next dispatch.
+#import bindings
+#import camera
+#import panels
+#import light
+
+// Stages of a ray.
+const START = 0u;
+const VIEW = 1u; // reads a panel of the view ray
+const SUN = 2u; // reads a panel toward the sun, from one of the two points of the view panel
+const DONE = 3u;
+
+// Largest optical depth of a view panel before any halving.
+const THICKEST = 0.5;
+// Largest difference of the optical depths toward the sun from the two points of a panel, before any halving: behind a
+// steep edge the light may come and go within one.
+const UNEVEN = 0.5;
+// Panels are never made shorter, m.
+const SHORTEST = 1e-3;
+// Where a ray ends: what is left is less than what f32 keeps of a sum.
+const LEAST_TRANSMITTANCE = 1e-6;
+// After so many halvings a ray counts as converged; `uncertainty` tells.
+const MOST_HALVINGS = 5u;
+// Radiance, as a share of the sun's irradiance, below which errors do not matter.
+const DARK = 1e-6;
+
+@compute @workgroup_size(64)
+fn reference(@builtin(global_invocation_id) id: vec3u) {
+    if id.x >= frame.active_rays {
+        return;
+    }
+    let index = active_rays[id.x];
+    let pixel = vec2u(index % frame.width, frame.first_row + index / frame.width);
+    let view = view_direction(vec2f(pixel) + 0.5);
+    let direction = view.xyz;
+    let stretches = cloud_stretches(direction);
+    let room = max(quality.view_distance - stretches.start, 0.0);
+    let length = select(0.0, min(stretches.first + stretches.second, room), view.w > 0.0);
+    let empty = length <= 0.0 || (!VOLUME && params.clouds.coverage <= 0.0);
+    let one_minus_mu = one_minus_cos(direction, frame.sun_direction);
+    let sunlit = any(sky_light[2].rgb > vec3f(0.0));
+    let opaque = dark_depth();
+    let pixel_size = pixel_width();
+
+    var ray = reference_rays[index];
+    evaluations = ray.evaluations;
+    var turns = 0u;
+    for (; turns < frame.budget && ray.stage != DONE; turns++) {
+        let finer = exp2(-f32(ray.level));
+        if ray.stage == START {
+            ray.x = 0.0;
+            ray.longest = 1e30;
+            ray.transmittance = 1.0;
+            ray.sun = 0.0;
+            ray.above = 0.0;
+            ray.below = 0.0;
+            ray.weight = 0.0;
+            ray.distance = 0.0;
+            ray.stage = VIEW;
+        }
+
+        // The panel at hand, on either ray.
+        let toward_sun = ray.stage == SUN;
+        let view_panel = Panel(ray.x, ray.end);
+        let from_point = panel_points(view_panel)[ray.point];
+        let t = stretch_distance(stretches, select(ray.x, from_point, toward_sun));
+        let width = t * pixel_size;
+        let origin = select(vec3f(0.0), t * direction, toward_sun);
+        let along = select(direction, frame.sun_direction, toward_sun);
+        var s = stretches;
+        if toward_sun {
+            s = Stretches(ray.sun_start, ray.sun_first, ray.sun_gap, ray.sun_second);
+        }
+        let x = select(ray.x, ray.sun_x, toward_sun);
+        let left = select(length, s.first + s.second, toward_sun) - x;
+        var longest = finer * max(2.0 * finest_feature(), width);
+        if VOLUME {
+            // Cells end the panels toward the sun; those of the view are halved, as their light is no cubic.
+            longest = select(finer * frame.voxel, 1e30, toward_sun);
+        }
+        longest = select(min(longest, ray.longest), longest, toward_sun);
+        let panel = panel_from(origin, along, s, x, min(longest, left));
+        let reading = read_panel(panel, origin, along, s, width);
+        let depth = panel_depth(panel, reading.density);
+
+        var add = false; // whether the view panel is ready to be added up
+        var next_sun = false; // whether a sun ray begins
+        if toward_sun {
+            ray.sun_depth += depth;
+            ray.sun_x = panel.end;
+            if panel.end >= s.first + s.second || ray.sun_depth > opaque {
+                if ray.point == 0u {
+                    ray.first_depth = ray.sun_depth;
+                    ray.point = 1u;
+                    next_sun = true;
+                } else {
+                    add = true;
+                }
+            }
+        } else if depth > finer * THICKEST && panel.end - panel.begin > SHORTEST {
+            ray.longest = (panel.end - panel.begin) * max(0.9 * finer * THICKEST / depth, 0.1);
+        } else {
+            ray.end = panel.end;
+            ray.density = reading.density;
+            ray.height = reading.height;
+            ray.precipitation = reading.precipitation;
+            ray.longest = 2.0 * (panel.end - panel.begin);
+            ray.point = 0u;
+            ray.sun_depth = 0.0;
+            ray.first_depth = 0.0;
+            if depth <= 0.0 {
+                ray.x = panel.end;
+            } else if sunlit {
+                next_sun = true;
+            } else {
+                add = true;
+            }
+        }
+        if next_sun {
+            ray.stage = SUN;
+            ray.sun_x = 0.0;
+            ray.sun_depth = 0.0;
+            let from_here = panel_points(Panel(ray.x, ray.end))[ray.point];
+            let sun = cloud_stretches_from(stretch_distance(stretches, from_here) * direction, frame.sun_direction);
+            ray.sun_start = sun.start;
+            ray.sun_first = sun.first;
+            ray.sun_gap = sun.gap;
+            ray.sun_second = sun.second;
+        }
+        if add {
+            let whole = Panel(ray.x, ray.end);
+            let points = panel_points(whole);
+            let x = panel_depth(whole, ray.density);
+            let weight = ray.transmittance * x * one_minus_exp_over(x);
+            let first = first_share(x, ray.density);
+            var sun = vec2f(0.0);
+            if sunlit {
+                sun.x = sun_scattering(ray.first_depth, ray.precipitation.x, one_minus_mu);
+                sun.y = sun_scattering(ray.sun_depth, ray.precipitation.y, one_minus_mu);
+            }
+            let uneven = abs(ray.sun_depth - ray.first_depth) > finer * UNEVEN
+                && weight * abs(sun.x - sun.y) > 0.1 * quality.tolerance * (ray.sun + DARK);
+            ray.stage = VIEW;
+            if uneven && ray.end - ray.x > SHORTEST {
+                ray.longest = 0.5 * (ray.end - ray.x);
+            } else {
+                var sum = Gathered(ray.sun, ray.above, ray.below, ray.weight, ray.distance);
+                sum = gather(sum, first * weight, sun.x, ray.height.x, stretch_distance(stretches, points.x));
+                sum = gather(sum, (1.0 - first) * weight, sun.y, ray.height.y, stretch_distance(stretches, points.y));
+                ray.sun = sum.sun;
+                ray.above = sum.above;
+                ray.below = sum.below;
+                ray.weight = sum.weight;
+                ray.distance = sum.distance;
+                ray.transmittance *= exp(-x);
+                ray.x = ray.end;
+            }
+        }
+        if empty || (ray.stage == VIEW && (ray.x >= length || ray.transmittance < LEAST_TRANSMITTANCE)) {
+            ray = finished(ray, index, empty);
+        }
+    }
+    ray.evaluations = evaluations;
+    reference_rays[index] = ray;
+    progress[id.x] = vec2u(turns, select(0u, 1u, ray.stage == DONE));
+}
+
+// A ray that has come to its end: done, or from the start again with panels half as long.
+fn finished(given: ReferenceRay, index: u32, empty: bool) -> ReferenceRay {
+    var ray = given;
+    let sum = Gathered(ray.sun, ray.above, ray.below, ray.weight, ray.distance);
+    let result = vec4f(gathered_radiance(sum), ray.transmittance);
+    let change = abs(result - ray.previous);
+    let dark = DARK * sky_light[2].rgb;
+    let steady = all(change.rgb <= quality.tolerance * (result.rgb + dark)) && change.a <= 0.1 * quality.tolerance;
+    if empty || (ray.level > 0u && steady) || ray.level >= MOST_HALVINGS {
+        clouds[index] = select(result, vec4f(0.0, 0.0, 0.0, 1.0), empty);
+        cloud_depth[index] = select(-1.0, sum.distance / sum.weight, !empty && sum.weight > 0.0);
+        samples[index] = evaluations;
+        uncertainty[index] = select(vec4f(change.rgb, 0.0), vec4f(0.0), empty);
+        ray.stage = DONE;
+    } else {
+        ray.previous = result;
+        ray.level += 1u;
+        ray.stage = START;
+    }
+    return ray;
+}

@@ -1,0 +1,60 @@
+// The user's grid: extinction at the centres of voxels, trilinear between them, in a straight box.
+#import bindings
+
+fn in_volume(p: vec3f) -> bool {
+    return all(p >= frame.volume_low) && all(p <= frame.volume_high);
+}
+
+// Where a point lies, in voxels: a whole number at the centre of each, so that the value is a cubic along a ray between
+// two whole numbers.
+fn volume_cell(p: vec3f) -> vec3f {
+    return (p - frame.volume_low) * frame.volume_scale - 0.5;
+}
+
+// The density in the box, 1 at the largest extinction. Outside it the value of its nearest face.
+fn volume_density(p: vec3f) -> f32 {
+    if PRECISE {
+        return volume_density_exact(volume_cell(p));
+    }
+    let uvw = (volume_cell(p) + 0.5) / vec3f(textureDimensions(volume));
+    return textureSampleLevel(volume, clamp_sampler, uvw, 0.0).r;
+}
+
+// Hardware filters with weights of as little as 8 bits (docs/numerics.md): here are all 24.
+fn volume_density_exact(cell: vec3f) -> f32 {
+    let last = vec3f(textureDimensions(volume_exact)) - 1.0;
+    let at = clamp(cell, vec3f(0.0), last);
+    let low = min(floor(at), max(last - 1.0, vec3f(0.0)));
+    let f = at - low;
+    let a = vec3i(low);
+    let b = vec3i(min(low + 1.0, last));
+    let x00 = mix(volume_texel(a.x, a.y, a.z), volume_texel(b.x, a.y, a.z), f.x);
+    let x10 = mix(volume_texel(a.x, b.y, a.z), volume_texel(b.x, b.y, a.z), f.x);
+    let x01 = mix(volume_texel(a.x, a.y, b.z), volume_texel(b.x, a.y, b.z), f.x);
+    let x11 = mix(volume_texel(a.x, b.y, b.z), volume_texel(b.x, b.y, b.z), f.x);
+    return mix(mix(x00, x10, f.y), mix(x01, x11, f.y), f.z);
+}
+
+fn volume_texel(x: i32, y: i32, z: i32) -> f32 {
+    return textureLoad(volume_exact, vec3i(x, y, z), 0).r;
+}
+
+// Distance along a ray to the first plane through voxel centres past `t`: between two of them the density is a cubic,
+// for which two Gauss points are exact. Planes come from whole numbers, so that no error adds up (hazard 17).
+fn next_plane(origin: vec3f, direction: vec3f, t: f32) -> f32 {
+    let start = volume_cell(origin);
+    let speed = direction * frame.volume_scale;
+    var next = 1e30;
+    for (var axis = 0; axis < 3; axis++) {
+        let v = speed[axis];
+        if abs(v) > 1e-20 {
+            let at = start[axis] + t * v;
+            let ahead = sign(v);
+            // The next whole number in the direction of the ray, or, where rounding has left it behind, the one after.
+            let plane = select(ceil(at) - 1.0, floor(at) + 1.0, v > 0.0);
+            let hit = (plane - start[axis]) / v;
+            next = min(next, select((plane + ahead - start[axis]) / v, hit, hit > t * (1.0 + 2e-7)));
+        }
+    }
+    return next;
+}

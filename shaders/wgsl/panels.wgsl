@@ -77,3 +77,10 @@ fn finest_feature() -> f32 {
     }
     return min(params.clouds.shape_scale / 128.0, params.clouds.detail_scale / 32.0);
 }
+
+// The longest panel that sees what no level of detail smooths: the profile by height, and a texel of the weather map.
+fn coarsest_panel() -> f32 {
+    let thickness = params.clouds.top - params.clouds.base;
+    let texel = params.weather.extent / f32(textureDimensions(weather_map).x);
+    return max(min(thickness / 16.0, 2.0 * texel), 2.0 * finest_feature());
+}

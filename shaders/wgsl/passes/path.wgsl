@@ -55,8 +55,8 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
         let s = Stretches(ray.flight.x, ray.flight.y, ray.flight.z, ray.flight.w);
         let length = s.first + s.second;
         let direction = select(frame.sun_direction, ray.direction, ray.stage == FLIGHT);
-        let from = ray.origin + stretch_distance(s, ray.x) * direction;
-        let majorant = majorant_at(from, altitude_at(from));
+        let here = ray.origin + stretch_distance(s, ray.x) * direction;
+        let majorant = majorant_at(here, altitude_at(here));
         let free = max(-log(1.0 - u.x) / max(majorant.density * frame.extinction, 1e-30), SHORTEST);
         let before_gap = ray.x < s.first && s.second > 0.0;
         let room = select(length, s.first, before_gap) - ray.x;

@@ -188,7 +188,7 @@ def any_sky(rng, params):
     base = rng.uniform(300, 3000)
     return params.with_(
         **{
-            "clouds.coverage": rng.uniform(0.6, 1),
+            "clouds.coverage": rng.uniform(0.7, 1),
             "clouds.type": rng.uniform(0.2, 1),
             "clouds.precipitation": rng.uniform(0, 1),
             "clouds.base": base,
@@ -241,12 +241,13 @@ def test_extinction(renderer, noise_params, seed, time, map_of_your_own):
 
     Errors are shares of the extinction at density 1.
 
-    - With the GPU's texels what is left is f32: positions to a centimetre 170 km from the first
-      point, on the steepest height profile (stratus, 0.02 of the shell), enlarged by up to
-      1 / (1 - 0.6) by erosion. Largest seen: 3e-4.
+    - With the GPU's texels what is left is f32: positions to a centimetre or two 170 km from the
+      first point, seen where the detail is finest or the profile steepest. In 32 such skies up to
+      7e-4 (mean square 4e-5), or 2e-3 (1e-4) with the filter weights in steps of 1/256 that GPUs
+      may have.
     - With its own texels, exact where the GPU's are half floats, each read is off by up to one
-      step, 5e-4. It goes into the shape as it is, but what it does to the type is enlarged by the
-      profile, fifty times for stratus at its top. Largest seen: 3e-3, mean square 2e-4.
+      step, 5e-4. That goes into the shape as it is, but what it does to the type is enlarged by
+      the profile, tens of times for stratus at its top. In the same skies up to 3e-3 (2e-4).
     """
     rng = np.random.default_rng(seed)
     params = any_sky(rng, noise_params)
@@ -259,11 +260,11 @@ def test_extinction(renderer, noise_params, seed, time, map_of_your_own):
     )
     got = renderer().density(points, params, time=time) / params.clouds.extinction
     inside = (heights > params.clouds.base) & (heights < params.clouds.top)
-    assert (got[inside] > 0).mean() > 0.1 and (got[~inside] == 0).all()
+    assert (got[inside] > 0).mean() > 0.05 and (got[~inside] == 0).all()
 
     bakes = noise_twin.bakes(params)
     on_gpu = {name: lambda at, name=name: texels(name, at, params, time=time) for name in bakes}
-    for textures, largest, typical in ((on_gpu, 1e-3, 1e-4), (bakes, 1e-2, 4e-4)):
+    for textures, largest, typical in ((on_gpu, 2e-3, 2e-4), (bakes, 5e-3, 4e-4)):
         expected = noise_twin.extinction(points, params, time, gradients, textures)
         error = got - expected / params.clouds.extinction
         assert np.abs(error).max() < largest

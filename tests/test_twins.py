@@ -255,8 +255,10 @@ def test_extinction(renderer, noise_params, seed, time, map_of_your_own):
         params = params.with_(**{"weather.map": rng.uniform(0.2, 1, (6, 9, 3))})
     points, heights = points_about_the_shell(rng, params, 1000)
     names = ["STRATUS", "STRATOCUMULUS", "CUMULUS"]
+    # With these parameters, so that no other noise is baked in between.
     gradients = np.array(
-        [probe(name, [0.0], imports=["density"])[0] for name in names], dtype=np.float64
+        [probe(name, [0.0], imports=["density"], params=params)[0] for name in names],
+        dtype=np.float64,
     )
     got = renderer().density(points, params, time=time) / params.clouds.extinction
     inside = (heights > params.clouds.base) & (heights < params.clouds.top)

@@ -21,8 +21,8 @@ const THICKEST = 0.5;
 const UNEVEN = 0.5;
 // Panels are never made shorter, m.
 const SHORTEST = 1e-3;
-// Where a ray ends: what is left is less than what f32 keeps of a sum.
-const LEAST_TRANSMITTANCE = 1e-6;
+// Where a ray ends: behind it even light of full strength does not matter.
+const LEAST_TRANSMITTANCE = 1e-8;
 // After so many halvings a ray counts as converged; `uncertainty` tells.
 const MOST_HALVINGS = 5u;
 // Radiance, as a share of the sun's irradiance, below which errors do not matter.

@@ -9,9 +9,9 @@ import pytest
 
 import nubis
 import twin
+from noise_twin import FBM, base_shape, eroded, height_profile, with_coverage
 from nubis.testing import probe
 
-FBM = np.array([0.625, 0.25, 0.125])
 UNIT = np.linspace(0, 1, 11)
 
 
@@ -25,35 +25,6 @@ def profile_constants():
     return np.array(
         [probe(name, [0.0], imports=["density"])[0] for name in names], dtype=np.float64
     )
-
-
-def smoothstep(a, b, v):
-    x = np.clip((v - a) / (b - a), 0, 1)
-    return x * x * (3 - 2 * x)
-
-
-def height_profile(height, kind, constants):
-    """nubis2015: the sum of three gradients, weighted by type."""
-    weights = np.stack([1 - 2 * kind, 1 - np.abs(2 * kind - 1), 2 * kind - 1]).clip(0)
-    a, b, c, d = np.tensordot(constants.T, weights, 1)
-    return np.clip(twin.remap(height, a, b), 0, 1) * (1 - smoothstep(c, d, height))
-
-
-def base_shape(noise):
-    return twin.remap(noise[..., 0], -(1 - noise[..., 1:] @ FBM), 1)
-
-
-def with_coverage(base, coverage):
-    """More coverage is more cloud: nothing is left at 0, the base as it is at 1."""
-    coverage = np.maximum(coverage, 1e-9)
-    return np.clip(twin.remap(base, 1 - coverage, 1), 0, 1) * coverage
-
-
-def eroded(shape, detail, height, depth):
-    """Wispy below, billowy above."""
-    share = np.clip(10 * height, 0, 1)
-    modifier = detail * (1 - share) + (1 - detail) * share
-    return np.where(shape > 0, np.clip(twin.remap(shape, modifier * depth, 1), 0, 1), 0)
 
 
 def test_height_profile():

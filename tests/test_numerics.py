@@ -5,14 +5,10 @@ import pytest
 
 import nubis
 import twin
+from noise_twin import f32, random3
 from nubis.testing import probe
 
 EARTH = 6_371_000.0
-
-
-def f32(values):
-    """Values as the shader gets them, in float64."""
-    return np.asarray(values, dtype=np.float32).astype(np.float64)
 
 
 def test_share_of_a_step():
@@ -149,41 +145,6 @@ def test_stretches_of_a_ray_inside_the_shell(case):
         assert tuple(got) == (start, first, gap, second)
 
 
-def pcg3d(v):
-    """Jarzynski and Olano 2020, from the paper."""
-    with np.errstate(over="ignore"):
-        x, y, z = (c * np.uint32(1664525) + np.uint32(1013904223) for c in v)
-        x = x + y * z
-        y = y + z * x
-        z = z + x * y
-        x, y, z = (c ^ (c >> np.uint32(16)) for c in (x, y, z))
-        x = x + y * z
-        y = y + z * x
-        z = z + x * y
-    return x, y, z
-
-
-def lattice(period, salt):
-    """The random3 of every cell of a lattice, shape (period, period, period, 3), indexed [x, y,
-    z].
-    """
-    cells = np.indices((period,) * 3).astype(np.uint32)
-    salts = [np.uint32(salt * k % 2**32) for k in (747796405, 2891336453, 277803737)]
-    return np.stack(
-        [
-            (c >> np.uint32(8)) / 2**24
-            for c in pcg3d([c + s for c, s in zip(cells, salts, strict=True)])
-        ],
-        -1,
-    )
-
-
-def test_random_numbers_are_those_of_the_paper():
-    cells = np.indices((5, 5, 5)).reshape(3, -1).T
-    got = probe("vec4f(random3(vec3u(x.xyz), 9u), 0.0)", cells, imports=["random"])[:, :3]
-    np.testing.assert_array_equal(got, lattice(5, 9).reshape(-1, 3).astype(np.float32))
-
-
 @pytest.mark.parametrize("salt", [0, 1, 977])
 def test_random_numbers_are_uniform(salt):
     """Each component, and neighbours and salts without correlation: 1/sqrt(n) is one standard
@@ -204,16 +165,6 @@ def test_random_numbers_are_uniform(salt):
         correlation = [np.corrcoef(a[..., i].ravel(), b[..., i].ravel())[0, 1] for i in range(4)]
         assert np.abs(correlation).max() < 5 / np.sqrt(n)
     assert np.abs(np.corrcoef(got.T) - np.eye(4)).max() < 5 / np.sqrt(n)
-
-
-def test_cells_wrap():
-    cells = np.array(
-        [[x, y, z, n] for n in (1, 3, 8) for x in range(-n, 2 * n) for y, z in [(x, 0), (-1, n)]]
-    )
-    got = probe(
-        "vec4f(vec3f(wrap_cell(vec3i(x.xyz), vec3i(i32(x.w)))), 0.0)", cells, imports=["random"]
-    )
-    np.testing.assert_array_equal(got[:, :3], np.mod(cells[:, :3], cells[:, 3:]))
 
 
 def noises(p):
@@ -245,9 +196,8 @@ def test_worley_against_all_feature_points(rng):
     """Its 27 cells find the nearest of all points of the tile and of the tiles around it."""
     period, salt = 3, 5
     p = f32(rng.uniform(0, 1, (300, 3)))
-    points = (np.indices((period,) * 3).transpose(1, 2, 3, 0) + lattice(period, salt)).reshape(
-        -1, 3
-    )
+    cells = np.indices((period,) * 3).reshape(3, -1).T
+    points = cells + random3(cells, salt)
     apart = np.abs(p[:, None] * period - points)
     apart = np.minimum(apart, period - apart)
     nearest = np.linalg.norm(apart, axis=2).min(axis=1)

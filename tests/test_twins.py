@@ -44,8 +44,9 @@ def test_random_numbers_to_the_bit(rng, salt):
     np.testing.assert_array_equal(got, noise_twin.random3(cells, salt))
 
 
-def test_cells_wrap_in_lattices_of_unequal_sides(rng):
-    period = np.array([2, 111, 1])
+@pytest.mark.parametrize("period", [(1, 3, 8), (2, 111, 1)])
+def test_cells_wrap(rng, period):
+    period = np.array(period)
     cells = rng.integers(-period, 2 * period, (2000, 3))
     wgsl = "vec4f(vec3f(wrap_cell(vec3i(x.xyz), vec3i({}, {}, {}))), 0.0)".format(*period)
     got = probe(wgsl, cells, imports=["random"])[:, :3]

@@ -14,23 +14,51 @@ const CONE = array<vec3f, 6>(
     vec3f(-0.16852403, 0.14748697, 0.97460106),
 );
 
-// Optical depth from a point toward the sun. Near samples are spaced by squares, each standing for the stretch around
-// it; the far one, at three times their reach (nubis2015), stands for the stretch from one to five times.
+// Optical depth from a point toward the sun. Each sample stands for the stretch around it, which grows with its distance;
+// the far one, at three times the reach of the others (nubis2015), for the stretch from one to five times.
 fn optical_depth_to_sun(p: vec3f, opacity: f32, width: f32) -> f32 {
     let n = quality.light_steps;
-    let reach = quality.light_distance;
+    let samples = light_samples(p);
     var depth = 0.0;
     // Behind little cloud the near samples see the detail; the others are cheap.
     let full = select(0u, n, opacity < quality.cheap_light);
     for (var i = 0u; i < full; i++) {
-        let at = light_sample(p, i, n, reach, width);
+        let at = light_sample(samples, p, i, width);
         depth += cloud_density_at(at.p, at.altitude, at.width) * at.length;
     }
     for (var i = full; i < n + quality.far_sample; i++) {
-        let at = light_sample(p, i, n, reach, width);
+        let at = light_sample(samples, p, i, width);
         depth += cloud_density_cheap(at.p, at.altitude, at.width) * at.length;
     }
     return depth * frame.extinction;
+}
+
+// Where the samples lie: by squares over a given reach (the stretch of the k-th of n begins at (k / n)^2 of it), or to the
+// end of the clouds, where log(1 + distance / NEAR) grows in equal steps.
+struct LightSamples {
+    reach: f32,
+    rate: f32, // of the logarithm for each sample; 0 for squares
+}
+
+// m: light is lost in the first tens of metres or not for kilometres.
+const NEAR = 150.0;
+
+fn light_samples(p: vec3f) -> LightSamples {
+    if quality.light_distance > 0.0 {
+        return LightSamples(quality.light_distance, 0.0);
+    }
+    let s = cloud_stretches_from(p, frame.sun_direction);
+    let reach = s.start + s.first + s.gap + s.second;
+    return LightSamples(reach, log2(1.0 + reach / NEAR) / f32(quality.light_steps));
+}
+
+// Where the stretch of a sample begins, m.
+fn light_stretch(samples: LightSamples, i: f32) -> f32 {
+    if samples.rate > 0.0 {
+        return NEAR * (exp2(samples.rate * i) - 1.0);
+    }
+    let share = i / f32(quality.light_steps);
+    return share * share * samples.reach;
 }
 
 struct LightSample {
@@ -40,12 +68,13 @@ struct LightSample {
     width: f32,
 }
 
-fn light_sample(p: vec3f, i: u32, n: u32, reach: f32, width: f32) -> LightSample {
-    let a = f32(i) / f32(n);
-    let b = f32(i + 1u) / f32(n);
-    let is_far = i == n;
-    let length = select((b * b - a * a) * reach, 4.0 * reach, is_far);
-    let s = select(0.5 * (b * b + a * a) * reach, 3.0 * reach, is_far);
+fn light_sample(samples: LightSamples, p: vec3f, i: u32, width: f32) -> LightSample {
+    let a = light_stretch(samples, f32(i));
+    let b = light_stretch(samples, f32(i + 1u));
+    let reach = samples.reach;
+    let is_far = i == quality.light_steps;
+    let length = select(b - a, 4.0 * reach, is_far);
+    let s = select(0.5 * (a + b), 3.0 * reach, is_far);
     let at = p + s * (frame.sun_direction + quality.cone * CONE[i % 6u]);
     return LightSample(at, altitude_at(at), length, max(width, 0.5 * length));
 }

@@ -46,11 +46,7 @@ impl Variant {
 
     fn constants(self) -> [(&'static str, f64); 3] {
         let switch = |on| f64::from(u8::from(on));
-        [
-            ("MODEL", f64::from(self.model as u32)),
-            ("VOLUME", switch(self.volume)),
-            ("PRECISE", switch(self.precise)),
-        ]
+        [("MODEL", f64::from(self.model as u32)), ("VOLUME", switch(self.volume)), ("PRECISE", switch(self.precise))]
     }
 }
 

@@ -206,15 +206,15 @@ params! {
         empty_samples: u32 = 6, in 1..=4096 "";
         /// Light samples toward the sun, besides the far one.
         light_steps: u32 = 8, in 1..=128 "";
-        /// How far the light samples reach; the far sample stands for as much as four times that, beyond.
-        light_distance: f32 = 2500.0, in 1..=100000 "m";
-        /// Whether there is a far light sample, for shadows from distant clouds.
-        far_sample: bool = true;
+        /// How far the light samples reach; 0 spreads them to where the clouds end.
+        light_distance: f32 = 0.0, in 0..=100000 "m";
+        /// Whether there is one more light sample, at three times that reach, for shadows from distant clouds (nubis2015).
+        far_sample: bool = false;
         /// Half width of the cone that the light samples are spread over, as a share of its length (nubis2015); 0 looks
         /// straight at the sun.
         cone: f32 = 0.0, in 0..=1 "";
         /// Opacity in front of a sample past which its light samples leave out the detail (nubis2015: 0.3).
-        cheap_light: f32 = 0.3, in 0..=1 "";
+        cheap_light: f32 = 1.0, in 0..=1 "";
         /// Transmittance at which a ray ends; what is left is scaled away, not lost.
         min_transmittance: f32 = 0.01, in 0..=0.5 "";
         /// Whether each ray starts at a blue-noise offset of up to one step.
@@ -302,19 +302,25 @@ impl Quality {
             big_step: 1,
             light_steps: 5,
             light_distance: 700.0,
+            far_sample: true,
             cone: 0.12,
+            cheap_light: 0.3,
             ..balanced.clone()
         };
         Ok(match name {
             "balanced" => balanced,
-            "draft" => Self { steps_zenith: 40, steps_horizon: 96, light_steps: 5, cheap_light: 0.0, path_samples: 16, ..balanced },
+            "draft" => Self {
+                steps_zenith: 40,
+                steps_horizon: 96,
+                light_steps: 5,
+                cheap_light: 0.0,
+                path_samples: 16,
+                ..balanced
+            },
             "high" => Self {
                 steps_zenith: 192,
                 steps_horizon: 512,
-                light_steps: 16,
-                light_distance: 6000.0,
-                far_sample: false,
-                cheap_light: 1.0,
+                light_steps: 32,
                 min_transmittance: 0.002,
                 path_samples: 256,
                 ..balanced

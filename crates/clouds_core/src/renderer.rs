@@ -354,8 +354,14 @@ impl Renderer {
                 }
             }
         };
-        let refined =
-            Refined { camera: *camera, params: params.clone(), time, background, image: image.clone(), count: count + 1 };
+        let refined = Refined {
+            camera: *camera,
+            params: params.clone(),
+            time,
+            background,
+            image: image.clone(),
+            count: count + 1,
+        };
         self.refined = Some(refined);
         Ok(image)
     }

@@ -22,7 +22,8 @@ pub(crate) fn run(
         let (given, answers) = (ctx.gpu.buffer("points", bytes), ctx.gpu.buffer("results", bytes));
         ctx.gpu.queue.write_buffer(&given, 0, bytemuck::cast_slice(chunk));
         ctx.uniforms.upload_frame(ctx.gpu, &Frame { width: chunk.len() as u32, ..frame.clone() });
-        let bindings = [scene.bindings.as_slice(), &[("points", (&given).into()), ("results", (&answers).into())]].concat();
+        let bindings =
+            [scene.bindings.as_slice(), &[("points", (&given).into()), ("results", (&answers).into())]].concat();
         let mut work = ctx.gpu.work();
         work.dispatch(kernel, &bindings, [chunk.len() as u32, 1, 1])?;
         work.download(&answers, 0, bytes);

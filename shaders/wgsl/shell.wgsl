@@ -64,7 +64,6 @@ fn stretches_between(outer: Hit, inner: Hit, ground: Hit) -> Stretches {
     if !outer.hit {
         return Stretches(0.0, 0.0, 0.0, 0.0);
     }
-    // Below the surface (a camera under z = 0) the ground does not hide anything.
     let end = select(outer.far, min(outer.far, ground.near), ground.enters);
     if !inner.hit || inner.near >= end {
         return Stretches(outer.near, max(end - outer.near, 0.0), 0.0, 0.0);

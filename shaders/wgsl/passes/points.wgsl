@@ -32,7 +32,8 @@ fn sun_transmittance_at_points(@builtin(global_invocation_id) id: vec3u) {
     let top = params.clouds.top;
     let base = params.clouds.base;
     let high = params.high_clouds.altitude;
-    let ground = crossing(b, h * (2.0 * radius + h));
+    // A point under the ground is on it: rounding alone would put half of the points on the ground there.
+    let ground = crossing(b, max(h, 0.0) * (2.0 * radius + h));
     if ground.enters {
         results[id.x] = vec4f(0.0);
         return;

@@ -49,15 +49,18 @@ fn composite(@builtin(global_invocation_id) id: vec3u) {
 
     var radiance = vec3f(0.0);
     var transmittance = 1.0;
+    var weight_sum = 0.0;
     var distance_sum = 0.0;
     for (var i = 0; i < 3; i++) {
         let layer = layers[i];
         let opacity = 1.0 - layer.transmittance;
-        if opacity > 0.0 {
+        // Thinner than f32 tells from nothing, a layer may still shine.
+        if opacity > 0.0 || any(layer.radiance > vec3f(0.0)) {
             let seen = aerial_transmittance(altitude_at(layer.distance * direction), layer.distance);
             // The air in front holds its share of the light of all the air along the ray.
             let share = (1.0 - seen) / max(1.0 - air_beyond, 1.0 - seen + vec3f(1e-6));
             radiance += transmittance * (layer.radiance * seen + opacity * air * share);
+            weight_sum += transmittance * opacity;
             distance_sum += transmittance * opacity * layer.distance;
             transmittance *= layer.transmittance;
         }
@@ -73,7 +76,7 @@ fn composite(@builtin(global_invocation_id) id: vec3u) {
     }
 
     sky[index] = vec4f(behind, 1.0);
-    depth[index] = select(-1.0, distance_sum / max(1.0 - transmittance, 1e-6), transmittance < 1.0);
+    depth[index] = select(-1.0, distance_sum / weight_sum, weight_sum > 0.0);
     if frame.background > 0u {
         image[index] = vec4f(radiance + transmittance * behind, 1.0);
     } else {

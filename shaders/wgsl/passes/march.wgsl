@@ -89,6 +89,9 @@ fn march_ray(direction: vec3f, offset: f32) -> Cloud {
     let stretches = cloud_stretches(direction);
     let room = max(quality.view_distance - stretches.start, 0.0);
     let length = min(stretches.first + stretches.second, room);
+    // The optical depth is summed, not the transmittance multiplied: a thousand factors of almost 1 are all 1, or all
+    // 6e-8 less.
+    var optical_depth = 0.0;
     var transmittance = 1.0;
     if length <= 0.0 || params.clouds.coverage <= 0.0 {
         return Cloud(vec3f(0.0), 1.0, -1.0);
@@ -152,7 +155,8 @@ fn march_ray(direction: vec3f, offset: f32) -> Cloud {
                 ambient_bottom += weight * (1.0 - above);
                 weight_sum += weight;
                 distance_sum += weight * at.t;
-                transmittance *= exp(-x);
+                optical_depth += x;
+                transmittance = transmittance_of(optical_depth);
                 if transmittance < quality.min_transmittance {
                     i = steps.count;
                 }

@@ -213,7 +213,7 @@ impl Frame {
         self.high_direction = along.as_vec2().to_array();
         for octave in 0..8 {
             let updates = time * f64::from(high.evolution) * f64::from(1u32 << octave);
-            // Update numbers come round after 65,536, exact in f32.
+            // Update numbers come round after 65,536, exact in f32 (passes/high_clouds.wgsl).
             let (number, age) = (updates.floor().rem_euclid(65536.0) as f32, (updates - updates.floor()) as f32);
             let (numbers, ages) = if octave < 4 {
                 (&mut self.high_update, &mut self.high_age)

@@ -8,6 +8,10 @@
 // The sun's angular radius, 0.2666 degrees (IAU: 695 700 km at 1 au).
 const SUN_RADIUS = 0.004654;
 
+// Height above or below the high clouds at which an eye sees all of them, m. Short, as a place in the sky without them is
+// wrong too, and long enough that a level ray, which meets 50 times the layer, changes by 25 % a metre at the default.
+const HIGH_FADE = 100.0;
+
 // A sheet of light and shade at a distance.
 struct Layer {
     radiance: vec3f, // premultiplied
@@ -105,8 +109,10 @@ fn high_layer(direction: vec3f, distance: f32, hit: bool, ground_distance: f32, 
     }
     let p = distance * direction;
     let slant = max(abs(cos_zenith_at(p, direction)), 0.02);
-    let optical_depth = high_optical_depth(p);
-    let transmittance = exp(-optical_depth / slant);
+    // An eye that climbs through a layer without thickness would see it jump from above to below: near it, it fades.
+    let fade = saturate(abs(frame.altitude - params.high_clouds.altitude) / HIGH_FADE);
+    let optical_depth = fade * high_optical_depth(p);
+    let transmittance = transmittance_of(optical_depth / slant);
     let phase = model_phase(one_minus_cos(direction, frame.sun_direction));
     let radiance = phase * sky_light[3].rgb * sun_energy(optical_depth, 0.0)
         + has_ambient() * params.light.ambient_top * sky_light[0].rgb;

@@ -122,13 +122,14 @@ def shells(sky):
 
 @st.composite
 def eyes(draw, sky, arcs=(0.0, 0.0, 1.0, 1e4, 3e5, 1e7)):
-    """From 100 m under the ground to 100 000 km, often a centimetre from a shell."""
+    """From the middle of the planet to 100 000 km, often a centimetre from a shell."""
     shell = st.sampled_from(shells(sky))
     altitude = draw(
         st.one_of(
             st.builds(sum, st.tuples(shell, st.sampled_from([-0.01, 0.0, 0.01]))),
             st.floats(0, 8).map(lambda e: 10**e),
             st.sampled_from([-100.0, -0.01, 0.0, 2.0, 200.0, 4e5, 3.6e7, 1e8]),
+            st.just(-sky.atmosphere.planet_radius),
         )
     )
     radius = sky.atmosphere.planet_radius

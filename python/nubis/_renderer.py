@@ -223,7 +223,7 @@ class Renderer:
         wrapped = progress(shots) if progress else shots
         try:
             each = iter(wrapped)
-        except TypeError as error:
+        except Exception as error:  # whatever a class of its own raises
             raise ParameterError(
                 f"shots = {shots!r} is not allowed: it must be an iterable of shots ({error})"
             ) from error

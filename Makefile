@@ -12,7 +12,7 @@ export VIRTUAL_ENV := $(CURDIR)/$(VENV)
 unexport CONDA_PREFIX
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help setup build generate render test types lint bench clean
+.PHONY: help setup build generate render test stress types lint bench clean
 
 help: ## List the commands
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -61,6 +61,12 @@ gallery: build ## Render the pictures of the README into docs/images
 test: types ## Run all tests; needs no GPU
 	cargo test --release
 	$(BIN)/python -m pytest
+
+# EXAMPLES=2000 SEED=3 runs a slice. Pictures of skies at the ends of all ranges: half an hour on two cores.
+stress: export EXAMPLES := $(or $(EXAMPLES),21000)
+stress: export SEED := $(or $(SEED),1)
+stress: build ## Run 21,000 examples of the stress suite (EXAMPLES=... SEED=...)
+	$(BIN)/python -m pytest tests/test_stress.py
 
 types: build ## Check the types of the package, of its compiled module and of the examples
 	$(BIN)/python -m mypy.stubtest nubis._nubis

@@ -2,6 +2,7 @@
 
 import functools
 import os
+import sys
 
 import numpy as np
 import pytest
@@ -40,3 +41,13 @@ def renderer():
 @pytest.fixture
 def rng():
     return np.random.default_rng(20150809)
+
+
+def pytest_terminal_summary(terminalreporter):
+    """How many examples the stress suite has run."""
+    ran = getattr(sys.modules.get("test_stress"), "RAN", {})
+    if ran:
+        terminalreporter.section("stress")
+        for name, count in ran.items():
+            terminalreporter.write_line(f"{count:7} {name}")
+        terminalreporter.write_line(f"{sum(ran.values()):7} examples")

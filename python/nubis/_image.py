@@ -31,12 +31,7 @@ def to_srgb8(
     """
     if not isinstance(tonemap, str):
         raise ParameterError(f"tonemap = {tonemap!r} is not allowed: it must be a name")
-    try:
-        stops = float(exposure)
-    except (TypeError, ValueError):
-        raise ParameterError(
-            f"exposure = {exposure!r} is not allowed: it must be a finite number of stops"
-        ) from None
+    stops = _nubis.number("exposure", exposure)
     return _nubis.to_srgb8(_pixels(frame), stops, tonemap)
 
 

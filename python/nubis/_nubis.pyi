@@ -16,6 +16,7 @@ __all__ = [
     "check",
     "check_params",
     "check_quality",
+    "number",
     "quality",
     "to_srgb8",
     "write_exr",
@@ -202,6 +203,9 @@ def check(type_name: str, path: str, name: str, value: object) -> Any:
 
 def check_params(params: object) -> None: ...
 def check_quality(quality: Quality) -> None: ...
+def number(name: str, value: object) -> float:
+    """The number that is given for an argument, or `ParameterError`."""
+
 def quality(name: str) -> dict[str, Any]: ...
 def to_srgb8(
     frame: npt.NDArray[np.float32], exposure: float, tonemap: str

@@ -227,14 +227,25 @@ class Renderer:
             Wraps the shots, such as ``tqdm.tqdm``.
         """
         sky = _sky(background)
-        return self._frames(progress(shots) if progress else shots, sky)
+        if not (progress is None or callable(progress)):
+            raise ParameterError(
+                f"progress = {progress!r} is not allowed: it must be None or a function"
+            )
+        wrapped = progress(shots) if progress else shots
+        try:
+            each = iter(wrapped)
+        except Exception as error:  # whatever a class of its own raises
+            raise ParameterError(
+                f"shots = {shots!r} is not allowed: it must be an iterable of shots ({error})"
+            ) from error
+        return self._frames(each, sky)
 
-    def _frames(self, shots: Iterable[Shot], sky: bool) -> Iterator[Frame]:
+    def _frames(self, shots: Iterator[Shot], sky: bool) -> Iterator[Frame]:
         self._core.cut()
         for shot in shots:
             try:
                 camera, params, time = shot
-            except (TypeError, ValueError):
+            except Exception:  # whatever a class of its own raises
                 raise ParameterError(
                     f"shot = {shot!r} is not allowed: it must be (camera, params, time)"
                 ) from None
@@ -299,7 +310,7 @@ def _check_params(params: Any) -> None:
 def _size(name: str, value: Any) -> int:
     try:
         size = operator.index(value)
-    except TypeError:
+    except Exception:  # whatever a class of its own raises
         size = 0
     if not 1 <= size <= 65536 or isinstance(value, bool):
         raise ParameterError(
@@ -309,12 +320,7 @@ def _size(name: str, value: Any) -> int:
 
 
 def _time(value: Any) -> float:
-    try:
-        return float(value)
-    except (TypeError, ValueError):
-        raise ParameterError(
-            f"time = {value!r} is not allowed: it must be a finite number of seconds"
-        ) from None
+    return _nubis.number("time", value)
 
 
 def _sky(background: Any) -> bool:

@@ -95,7 +95,7 @@ fn further_orders(h: f32, mu_sun: f32) -> vec3f {
     return noon * dimmed * (0.9 * height_of_sun + 0.1 * smoothstep(-0.25, 0.0, mu_sun));
 }
 
-// Radiance of the air along a direction from the camera, up to the ground or to space.
+// Radiance of the air along a direction from the camera, up to the ground or to space, for a sun of irradiance 1.
 fn air_radiance(direction: vec3f) -> vec3f {
     if params.atmosphere.enabled == 0u {
         return vec3f(0.0);
@@ -127,8 +127,7 @@ fn air_radiance(direction: vec3f) -> vec3f {
         let mie = params.atmosphere.haze * exp(-max(h, 0.0) / MIE_HEIGHT);
         let sun = air_transmittance(h, mu_sun) * sun_above_ground(h, mu_sun);
         let rest = further_orders(h, mu_sun);
-        let source = (rayleigh * (rayleigh_phase * sun + rest) + mie * MIE_SCATTERING * (mie_phase * sun + rest))
-            * params.sun.irradiance;
+        let source = rayleigh * (rayleigh_phase * sun + rest) + mie * MIE_SCATTERING * (mie_phase * sun + rest);
         let extinction = rayleigh + mie * MIE_EXTINCTION;
         let x = extinction * step;
         let share = vec3f(one_minus_exp_over(x.r), one_minus_exp_over(x.g), one_minus_exp_over(x.b));
@@ -160,6 +159,10 @@ fn sky_coordinates(direction: vec3f) -> vec2f {
     return vec2f(u, v);
 }
 
+// What the sky map holds is the radiance for a sun of irradiance 1, times this: at most 4 in front of the sun, and 1e-7
+// at the end of dusk, both well inside the range of half floats (6e-5 to 65,504). The irradiance itself can be anything.
+const SKY_MAP_SCALE = 1024.0;
+
 // Radiance of the air in a direction, without clouds, sun and ground.
 fn sky_radiance(direction: vec3f) -> vec3f {
     let size = vec2f(textureDimensions(sky_map));
@@ -172,5 +175,5 @@ fn sky_radiance(direction: vec3f) -> vec3f {
         at.y < 0.5,
     );
     let u = mix(half_texel.x, 1.0 - half_texel.x, at.x);
-    return textureSampleLevel(sky_map, clamp_sampler, vec2f(u, v), 0.0).rgb;
+    return textureSampleLevel(sky_map, clamp_sampler, vec2f(u, v), 0.0).rgb * (params.sun.irradiance / SKY_MAP_SCALE);
 }

@@ -19,7 +19,7 @@ override PRECISE: bool = false; // that grid is read by loads and in f32, not fi
 @group(0) @binding(6) var curl_noise: texture_2d<f32>; // a divergence-free vector in xy (passes/noise)
 @group(0) @binding(7) var weather_map: texture_2d<f32>; // coverage, type, precipitation (passes/weather)
 @group(0) @binding(8) var high_map: texture_2d<f32>; // density of the high clouds (passes/high_clouds)
-@group(0) @binding(9) var sky_map: texture_2d<f32>; // radiance of the sky by direction (passes/sky)
+@group(0) @binding(9) var sky_map: texture_2d<f32>; // the sky by direction, see SKY_MAP_SCALE (passes/sky)
 @group(0) @binding(10) var<storage, read_write> sky_light: array<vec4f, 4>; // what the sky gives to clouds (passes/sky)
 @group(0) @binding(11) var blue_noise: texture_2d<f32>; // 64 x 64 ranks in [0, 1), void and cluster
 
@@ -58,7 +58,7 @@ struct ReferenceRay {
     evaluations: u32,
     x: f32, // m into the stretches
     longest: f32, // length that the next panel may have, m
-    transmittance: f32,
+    optical_depth: f32,
     // The panel at hand, and what is known of its two points.
     end: f32,
     point: u32,

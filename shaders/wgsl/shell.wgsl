@@ -38,6 +38,15 @@ fn hit_sphere_from(p: vec3f, direction: vec3f, altitude: f32) -> Hit {
     return crossing(b, (h - altitude) * (2.0 * radius + h + altitude));
 }
 
+// Where a ray from a point meets the ground. A point under the ground is on it: rounding alone would put half of the
+// points on the ground there.
+fn hit_ground_from(p: vec3f, direction: vec3f) -> Hit {
+    let radius = params.atmosphere.planet_radius;
+    let h = altitude_at(p);
+    let b = (radius + h) * cos_zenith_at(p, direction);
+    return crossing(b, max(h, 0.0) * (2.0 * radius + h));
+}
+
 // Altitude of a point.
 fn altitude_at(p: vec3f) -> f32 {
     let rh = frame.centre_distance;
@@ -60,7 +69,7 @@ struct Stretches {
     second: f32, // length of the second stretch
 }
 
-// Of a ray from the camera. The ground hides what is behind it, but not from below the surface (a camera under z = 0).
+// Of a ray from the camera, to the ground at most.
 fn cloud_stretches(direction: vec3f) -> Stretches {
     let ground = hit_sphere(direction, frame.power_ground);
     let end = select(1e30, ground.near, ground.enters);

@@ -59,6 +59,11 @@ fn finite(field: &str, v: DVec3, limit: f64) -> Result<DVec3> {
     ))
 }
 
+/// The vector made one long. Scaled first: the square of a length below 1e-154 m or above 1e154 m is no f64.
+fn unit(v: DVec3) -> Option<DVec3> {
+    (v / v.abs().max_element()).try_normalize()
+}
+
 fn check_fov(field: &str, fov: f64, max: f64) -> Result<f64> {
     if fov > 0.0 && fov <= max {
         return Ok(fov);
@@ -73,11 +78,11 @@ impl Camera {
         let target = finite("target", target, 4.0 * FARTHEST_EYE)?;
         let up = finite("up", up, f64::MAX)?;
         let fov = check_fov("fov_y", fov_y, 179.0)?;
-        let Some(forward) = (target - eye).try_normalize() else {
+        let Some(forward) = unit(target - eye) else {
             let at = format!("({}, {}, {})", target.x, target.y, target.z);
             return Err(Error::parameter("target", at, "another point than eye"));
         };
-        let across = up.try_normalize().and_then(|up| forward.cross(up).try_normalize_above(1e-9));
+        let across = unit(up).and_then(|up| forward.cross(up).try_normalize_above(1e-9));
         let Some(right) = across else {
             let at = format!("({}, {}, {})", up.x, up.y, up.z);
             return Err(Error::parameter("up", at, "a vector that is not along the view"));
@@ -124,7 +129,7 @@ impl Camera {
         let eye = finite("eye", eye, FARTHEST_EYE)?;
         let fov = check_fov("fov", fov, 360.0)?;
         let axis = finite("up", up, f64::MAX)?;
-        let Some(forward) = axis.try_normalize() else {
+        let Some(forward) = unit(axis) else {
             return Err(Error::parameter("up", "(0, 0, 0)", "a vector with a direction"));
         };
         // North made perpendicular to the axis; looking north or south, the zenith or nadir takes its place.

@@ -146,15 +146,22 @@ pub fn sun_direction(params: &Params) -> DVec3 {
 
 /// The unit vector toward a compass direction in degrees, clockwise from north.
 fn compass(degrees: f64) -> DVec2 {
-    let angle = degrees.to_radians();
-    DVec2::new(angle.sin(), angle.cos())
+    // Quarter turns are exact, so that a wind to the east does not blow north by 1e-16 of its way.
+    let quarters = (degrees / 90.0).round();
+    let (sin, cos) = (degrees - 90.0 * quarters).to_radians().sin_cos();
+    match quarters.rem_euclid(4.0) as u32 {
+        0 => DVec2::new(sin, cos),
+        1 => DVec2::new(cos, -sin),
+        2 => DVec2::new(-sin, -cos),
+        _ => DVec2::new(-cos, sin),
+    }
 }
 
 /// The fractional part of `v / period`, in f64: f32 coordinates would be metres off after a week of wind (hazard 13).
 fn wrap(v: f64, period: f32) -> f32 {
-    // Rounding to f32 may give 1.0, which is 0.
     let fraction = (v / f64::from(period)).rem_euclid(1.0) as f32;
-    if fraction >= 1.0 { 0.0 } else { fraction }
+    // Rounding to f32 may give 1.0, which is 0; and a way too long for f64 has no fraction.
+    if fraction < 1.0 { fraction } else { 0.0 }
 }
 
 impl Frame {
@@ -190,7 +197,8 @@ impl Frame {
         self.altitude = h as f32;
         self.centre_distance = distance as f32;
         self.horizon_dip = (radius / (radius + h.max(0.0))).acos() as f32;
-        self.power_ground = power(0.0);
+        // An eye under the ground is on it: were the ground to hide nothing from there, it would vanish at z = 0.
+        self.power_ground = power(0.0).max(0.0);
         self.power_base = power(f64::from(params.clouds.base));
         self.power_top = power(f64::from(params.clouds.top));
         self.power_high = power(f64::from(params.high_clouds.altitude));
@@ -238,7 +246,7 @@ impl Frame {
         self.high_direction = along.as_vec2().to_array();
         for octave in 0..8 {
             let updates = time * f64::from(high.evolution) * f64::from(1u32 << octave);
-            // Update numbers come round after 65,536, exact in f32.
+            // Update numbers come round after 65,536, exact in f32 (passes/high_clouds.wgsl).
             let (number, age) = (updates.floor().rem_euclid(65536.0) as f32, (updates - updates.floor()) as f32);
             let (numbers, ages) = if octave < 4 {
                 (&mut self.high_update, &mut self.high_age)

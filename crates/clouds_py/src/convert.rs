@@ -8,7 +8,7 @@ use clouds_core::schema::{self, Block, Map, Value};
 use glam::DVec3;
 use numpy::{PyArray1, PyArrayMethods as _, PyReadonlyArray3, PyUntypedArray, PyUntypedArrayMethods as _};
 use pyo3::prelude::*;
-use pyo3::types::{PyBool, PyDict, PyInt, PyString, PyTuple};
+use pyo3::types::{PyBool, PyBytes, PyDict, PyInt, PyString, PyTuple};
 
 use crate::{DensityGrid, exception};
 
@@ -17,38 +17,54 @@ pub fn value_from_python(value: &Bound<'_, PyAny>) -> PyResult<Value> {
     if value.is_none() {
         return Ok(Value::None);
     }
-    if let Ok(v) = value.cast::<PyBool>() {
-        return Ok(Value::Bool(v.is_true()));
+    if let Ok(array) = value.cast::<PyUntypedArray>()
+        && array.ndim() > 1
+    {
+        return map_from_python(value, array);
     }
-    if let Ok(v) = value.cast::<PyString>() {
-        return Ok(Value::Text(v.to_string()));
+    if let Some(value) = plain_from_python(value) {
+        return Ok(value);
     }
-    if let Ok(v) = value.cast::<PyInt>() {
-        // Beyond i64 no parameter reaches; as a float it is refused with its value.
-        return v.extract::<i64>().map(Value::Int).or_else(|_| v.extract::<f64>().map(Value::Float));
+    // Text would be a sequence of letters, and bytes one of numbers.
+    let parts: Vec<Bound<'_, PyAny>> =
+        if value.is_instance_of::<PyBytes>() { Vec::new() } else { value.extract().unwrap_or_default() };
+    let number = |part: &Bound<'_, PyAny>| match plain_from_python(part) {
+        Some(Value::Int(v)) => Some(v as f64),
+        Some(Value::Float(v)) => Some(v),
+        _ => None,
+    };
+    match parts.iter().map(number).collect() {
+        Some(numbers) if !parts.is_empty() => Ok(Value::Vector(numbers)),
+        _ => Ok(Value::Text(shown(value))),
     }
-    if let Ok(array) = value.cast::<PyUntypedArray>() {
-        return match array.ndim() {
-            0 => value_from_python(&value.call_method0("item")?),
-            1 => Ok(numbers(value)),
-            _ => map_from_python(value, array),
-        };
-    }
-    // NumPy scalars, which are no Python numbers.
-    if value.hasattr("dtype")? && value.hasattr("item")? {
-        return value_from_python(&value.call_method0("item")?);
-    }
-    if let Ok(v) = value.extract::<f64>() {
-        return Ok(Value::Float(v));
-    }
-    Ok(numbers(value))
 }
 
-fn numbers(value: &Bound<'_, PyAny>) -> Value {
-    match value.extract::<Vec<f64>>() {
-        Ok(v) => Value::Vector(v),
-        Err(_) => Value::Text(value.repr().map_or_else(|_| "?".into(), |text| text.to_string())),
+/// A switch, a word or a number.
+fn plain_from_python(value: &Bound<'_, PyAny>) -> Option<Value> {
+    if let Ok(v) = value.cast::<PyBool>() {
+        return Some(Value::Bool(v.is_true()));
     }
+    if let Ok(v) = value.cast::<PyString>() {
+        return Some(Value::Text(v.to_string_lossy().into_owned()));
+    }
+    if let Ok(v) = value.cast::<PyInt>() {
+        // Beyond i64 no parameter reaches; as a float it is refused with its value, if it fits into one.
+        let number = v.extract::<i64>().map(Value::Int).or_else(|_| v.extract::<f64>().map(Value::Float));
+        return Some(number.unwrap_or_else(|_| Value::Text(shown(value))));
+    }
+    if value.cast::<PyUntypedArray>().is_ok_and(|array| array.ndim() > 0) {
+        return None;
+    }
+    // NumPy scalars, which are no Python numbers, and arrays without axes.
+    let item = if value.hasattr("dtype").is_ok_and(|has| has) { value.call_method0("item").ok() } else { None };
+    match &item {
+        Some(item) if !item.hasattr("dtype").is_ok_and(|has| has) => plain_from_python(item),
+        _ => value.extract::<f64>().ok().map(Value::Float),
+    }
+}
+
+fn shown(value: &Bound<'_, PyAny>) -> String {
+    value.repr().map_or_else(|_| "?".into(), |text| text.to_string_lossy().into_owned())
 }
 
 fn map_from_python(value: &Bound<'_, PyAny>, array: &Bound<'_, PyUntypedArray>) -> PyResult<Value> {
@@ -59,7 +75,11 @@ fn map_from_python(value: &Bound<'_, PyAny>, array: &Bound<'_, PyUntypedArray>) 
     }
     let kwargs = PyDict::new(value.py());
     kwargs.set_item("dtype", "float32")?;
-    let numbers = value.py().import("numpy")?.call_method("ascontiguousarray", (value,), Some(&kwargs))?;
+    // Where warnings are errors, numbers that f32 does not hold are one.
+    let numpy = value.py().import("numpy")?;
+    let Ok(numbers) = numpy.call_method("ascontiguousarray", (value,), Some(&kwargs)) else {
+        return Ok(Value::Text(format!("array of shape {shape:?} with numbers beyond float32")));
+    };
     let numbers: PyReadonlyArray3<'_, f32> = numbers.extract()?;
     let data = numbers.as_slice()?.to_vec();
     Ok(Value::Map(Arc::new(Map { width: shape[1], height: shape[0], data })))

@@ -11,11 +11,16 @@ use clouds_core::camera::{Camera as CoreCamera, Convention, Projection};
 use clouds_core::gpu::{self, lock};
 use clouds_core::params::{Params, Quality};
 use clouds_core::renderer::Renderer as CoreRenderer;
+<<<<<<< HEAD
 use clouds_core::{DensityGrid as CoreGrid, Error, Result, color, files, params, schema};
+=======
+use clouds_core::schema::Value;
+use clouds_core::{Error, Result, color, files, params, schema};
+>>>>>>> stress
 use glam::DVec3;
 use numpy::{PyArray1, PyArrayMethods as _, PyReadonlyArrayDyn, PyUntypedArrayMethods as _};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyTuple};
+use pyo3::types::{PyDict, PyString, PyTuple};
 
 use convert::{
     number_from_python, params_from_python, quality_from_python, value_from_python, value_to_python, vector_from_python,
@@ -118,24 +123,24 @@ impl Camera {
     /// convention : {"opengl", "opencv"}
     ///     The camera's axes: +x right, +y up, looking down -z; or +x right, +y down, looking down +z.
     #[staticmethod]
-    #[pyo3(signature = (world_from_camera, fov_y=None, convention="opengl"))]
+    #[pyo3(
+        signature = (world_from_camera, fov_y=None, convention=None),
+        text_signature = "(world_from_camera, fov_y=None, convention='opengl')"
+    )]
     fn from_matrix(
         world_from_camera: &Bound<'_, PyAny>,
         fov_y: Option<&Bound<'_, PyAny>>,
-        convention: &str,
+        convention: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let py = world_from_camera.py();
         let rows = world_from_camera.extract::<[[f64; 4]; 4]>().map_err(|_| {
             let given = world_from_camera.str().map_or_else(|_| "?".into(), |text| text.to_string());
             exception(py, &Error::parameter("world_from_camera", given, "a 4 x 4 matrix of numbers"))
         })?;
-        let convention = match convention {
-            "opengl" => Convention::OpenGl,
-            "opencv" => Convention::OpenCv,
-            _ => {
-                let given = format!("{convention:?}");
-                return Err(exception(py, &Error::parameter("convention", given, "\"opengl\" or \"opencv\"")));
-            }
+        let convention = match convention.map_or(Ok(Value::Text("opengl".into())), value_from_python)? {
+            Value::Text(word) if word == "opengl" => Convention::OpenGl,
+            Value::Text(word) if word == "opencv" => Convention::OpenCv,
+            other => return Err(exception(py, &Error::parameter("convention", other, "\"opengl\" or \"opencv\""))),
         };
         raise(py, CoreCamera::from_matrix(rows, fov_y_or_default(fov_y)?, convention)).map(Self)
     }
@@ -351,12 +356,16 @@ fn array<'py, T: numpy::Element>(py: Python<'py>, data: Vec<T>, shape: &[usize])
 /// World points of shape (N, 3) from any array-like.
 fn points_from_python(py: Python<'_>, points: &Bound<'_, PyAny>) -> PyResult<Vec<[f64; 3]>> {
     let numpy = py.import("numpy")?;
-    let kwargs = PyDict::new(py);
-    kwargs.set_item("dtype", "float64")?;
     let allowed = "an array of finite numbers of shape (N, 3), world metres within 2e8 of the origin";
     let refuse = |what: String| exception(py, &Error::parameter("points", what, allowed));
+    // Text and complex numbers could be made floats too.
+    let points = numpy.call_method1("asarray", (points,)).map_err(|error| refuse(error.value(py).to_string()))?;
+    let kind: String = points.getattr("dtype")?.getattr("kind")?.extract()?;
+    if !"fiu".contains(&kind) {
+        return Err(refuse(format!("an array of dtype {}", points.getattr("dtype")?)));
+    }
     let points = numpy
-        .call_method("ascontiguousarray", (points,), Some(&kwargs))
+        .call_method1("ascontiguousarray", (points, "float64"))
         .map_err(|error| refuse(error.value(py).to_string()))?;
     let points: PyReadonlyArrayDyn<'_, f64> = points.extract()?;
     if points.shape().len() != 2 || points.shape()[1] != 3 {
@@ -390,9 +399,10 @@ impl Renderer {
         width: u32,
         height: u32,
         quality: &Bound<'_, PyAny>,
-        adapter: Option<String>,
+        adapter: Option<&Bound<'_, PyString>>,
     ) -> PyResult<Self> {
         let quality: Quality = quality_from_python(quality)?;
+        let adapter = adapter.map(|name| name.to_string_lossy().into_owned());
         let core = detached(py, move |_| CoreRenderer::new(width, height, quality, adapter.as_deref()))?;
         Ok(Self { core: Mutex::new(core), width, height })
     }
@@ -547,8 +557,8 @@ fn check_quality(quality: &Bound<'_, PyAny>) -> PyResult<()> {
 
 /// The fields of the named numerical method.
 #[pyfunction]
-fn quality<'py>(py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyDict>> {
-    let quality = raise(py, Quality::named(name))?;
+fn quality<'py>(py: Python<'py>, name: &Bound<'py, PyString>) -> PyResult<Bound<'py, PyDict>> {
+    let quality = raise(py, Quality::named(&name.to_string_lossy()))?;
     let block: &dyn schema::Block = &quality;
     let dict = PyDict::new(py);
     for (index, field) in block.fields().iter().enumerate() {
@@ -557,15 +567,21 @@ fn quality<'py>(py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyDict>> {
     Ok(dict)
 }
 
+/// The number that is given for an argument called `name`, or `ParameterError`.
+#[pyfunction]
+fn number(name: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
+    number_from_python(name, value)
+}
+
 #[pyfunction]
 fn to_srgb8<'py>(
     py: Python<'py>,
     frame: PyReadonlyArrayDyn<'py, f32>,
     exposure: f32,
-    tonemap: &str,
+    tonemap: &Bound<'py, PyString>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let shape = frame.shape().to_vec();
-    let pixels = raise(py, color::to_srgb8(frame.as_slice()?, shape[2], exposure, tonemap))?;
+    let pixels = raise(py, color::to_srgb8(frame.as_slice()?, shape[2], exposure, &tonemap.to_string_lossy()))?;
     array(py, pixels, &shape)
 }
 
@@ -591,7 +607,11 @@ fn write_hdr(py: Python<'_>, path: PathBuf, frame: PyReadonlyArrayDyn<'_, f32>) 
 mod _nubis {
     #[pymodule_export]
     use super::{
+<<<<<<< HEAD
         Camera, DensityGrid, Renderer, adapters, check, check_params, check_quality, quality, to_srgb8, write_exr,
+=======
+        Camera, Renderer, adapters, check, check_params, check_quality, number, quality, to_srgb8, write_exr,
+>>>>>>> stress
         write_hdr, write_png,
     };
 }

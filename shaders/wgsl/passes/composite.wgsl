@@ -8,6 +8,10 @@
 // The sun's angular radius, 0.2666 degrees (IAU: 695 700 km at 1 au).
 const SUN_RADIUS = 0.004654;
 
+// Height above or below the high clouds at which an eye sees all of them, m. Short, as a place in the sky without them is
+// wrong too, and long enough that a level ray, which meets 50 times the layer, changes by 25 % a metre at the default.
+const HIGH_FADE = 100.0;
+
 // A sheet of light and shade at a distance.
 struct Layer {
     radiance: vec3f, // premultiplied
@@ -49,15 +53,18 @@ fn composite(@builtin(global_invocation_id) id: vec3u) {
 
     var radiance = vec3f(0.0);
     var transmittance = 1.0;
+    var weight_sum = 0.0;
     var distance_sum = 0.0;
     for (var i = 0; i < 3; i++) {
         let layer = layers[i];
         let opacity = 1.0 - layer.transmittance;
-        if opacity > 0.0 {
+        // Thinner than f32 tells from nothing, a layer may still shine.
+        if opacity > 0.0 || any(layer.radiance > vec3f(0.0)) {
             let seen = aerial_transmittance(altitude_at(layer.distance * direction), layer.distance);
             // The air in front holds its share of the light of all the air along the ray.
             let share = (1.0 - seen) / max(1.0 - air_beyond, 1.0 - seen + vec3f(1e-6));
             radiance += transmittance * (layer.radiance * seen + opacity * air * share);
+            weight_sum += transmittance * opacity;
             distance_sum += transmittance * opacity * layer.distance;
             transmittance *= layer.transmittance;
         }
@@ -73,7 +80,7 @@ fn composite(@builtin(global_invocation_id) id: vec3u) {
     }
 
     sky[index] = vec4f(behind, 1.0);
-    depth[index] = select(-1.0, distance_sum / max(1.0 - transmittance, 1e-6), transmittance < 1.0);
+    depth[index] = select(-1.0, distance_sum / weight_sum, weight_sum > 0.0);
     if frame.background > 0u {
         image[index] = vec4f(radiance + transmittance * behind, 1.0);
     } else {
@@ -102,8 +109,10 @@ fn high_layer(direction: vec3f, distance: f32, hit: bool, ground_distance: f32, 
     }
     let p = distance * direction;
     let slant = max(abs(cos_zenith_at(p, direction)), 0.02);
-    let optical_depth = high_optical_depth(p);
-    let transmittance = exp(-optical_depth / slant);
+    // An eye that climbs through a layer without thickness would see it jump from above to below: near it, it fades.
+    let fade = saturate(abs(frame.altitude - params.high_clouds.altitude) / HIGH_FADE);
+    let optical_depth = fade * high_optical_depth(p);
+    let transmittance = transmittance_of(optical_depth / slant);
     let sun = sun_scattering(optical_depth, 0.0, one_minus_cos(direction, frame.sun_direction));
     var radiance = sun * sky_light[3].rgb;
     if MODEL != MODEL_SINGLE {

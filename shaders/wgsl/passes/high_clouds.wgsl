@@ -2,6 +2,9 @@
 #import bindings
 #import gradient_noise
 
+// Updates after which their numbers come round, as in frame.rs.
+const UPDATES = 65536u;
+
 @compute @workgroup_size(8, 8)
 fn high_clouds(@builtin(global_invocation_id) id: vec3u) {
     let size = textureDimensions(map_out);
@@ -21,7 +24,8 @@ fn high_clouds(@builtin(global_invocation_id) id: vec3u) {
         let age = select(frame.high_age, frame.high_age_small, i >= 4u)[i % 4u];
         let update = u32(select(frame.high_update, frame.high_update_small, i >= 4u)[i % 4u]);
         let before = streaks(at, 4u << i, seed + i * 7u + update * 977u);
-        let after = streaks(at, 4u << i, seed + i * 7u + (update + 1u) * 977u);
+        // The numbers come round (frame.rs): after the last update comes the first.
+        let after = streaks(at, 4u << i, seed + i * 7u + (update + 1u) % UPDATES * 977u);
         // The variance of the blend dips halfway; dividing it out keeps the cover steady.
         let steady = inverseSqrt(age * age + (1.0 - age) * (1.0 - age));
         sum += amplitude * mix(before, after, age) * steady;

@@ -89,6 +89,9 @@ fn march_ray(direction: vec3f, offset: f32) -> Cloud {
     let stretches = cloud_stretches(direction);
     let room = max(quality.view_distance - stretches.start, 0.0);
     let length = min(stretches.first + stretches.second, room);
+    // The optical depth is summed, not the transmittance multiplied: a thousand factors of almost 1 are all 1, or all
+    // 6e-8 less.
+    var optical_depth = 0.0;
     var transmittance = 1.0;
     if length <= 0.0 || (!VOLUME && params.clouds.coverage <= 0.0) {
         return Cloud(vec3f(0.0), 1.0, -1.0);
@@ -144,7 +147,8 @@ fn march_ray(direction: vec3f, offset: f32) -> Cloud {
                 }
                 let sun = sun_scattering(depth_to_sun, column.precipitation, one_minus_mu);
                 sum = gather(sum, weight, sun, column.height, at.t);
-                transmittance *= exp(-x);
+                optical_depth += x;
+                transmittance = transmittance_of(optical_depth);
                 if transmittance < quality.min_transmittance {
                     i = steps.count;
                 }

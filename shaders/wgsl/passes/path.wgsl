@@ -133,7 +133,7 @@ fn view_flight(view: vec4f) -> vec4f {
 
 // The stretches of a flight that starts at a point, to the ground at most.
 fn flight_from(p: vec3f, direction: vec3f) -> vec4f {
-    let ground = hit_sphere_from(p, direction, 0.0);
+    let ground = hit_ground_from(p, direction);
     var s = cloud_stretches_from(p, direction);
     if ground.enters {
         let first = clamp(ground.near - s.start, 0.0, s.first);
@@ -181,7 +181,7 @@ fn escaped(given: PathRay, pixel: vec2u) -> PathRay {
     if params.atmosphere.enabled == 0u {
         return path_ended(ray);
     }
-    let ground = hit_sphere_from(ray.origin, ray.direction, 0.0);
+    let ground = hit_ground_from(ray.origin, ray.direction);
     if !ground.enters {
         ray.light += ray.throughput * params.light.ambient_gain * sky_radiance(ray.direction);
         return path_ended(ray);

@@ -25,7 +25,7 @@ fn sun_transmittance_at_points(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let p = points[id.x].xyz;
-    if hit_sphere_from(p, frame.sun_direction, 0.0).enters {
+    if hit_ground_from(p, frame.sun_direction).enters {
         results[id.x] = vec4f(0.0);
         return;
     }

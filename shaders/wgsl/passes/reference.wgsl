@@ -22,7 +22,7 @@ const UNEVEN = 0.5;
 // Panels are never made shorter, m.
 const SHORTEST = 1e-3;
 // Where a ray ends: behind it even light of full strength does not matter.
-const LEAST_TRANSMITTANCE = 1e-8;
+const OPAQUE = 18.0;
 // After so many halvings a ray counts as converged; `uncertainty` tells.
 const MOST_HALVINGS = 5u;
 // Radiance, as a share of the sun's irradiance, below which errors do not matter.
@@ -54,7 +54,7 @@ fn reference(@builtin(global_invocation_id) id: vec3u) {
         if ray.stage == START {
             ray.x = 0.0;
             ray.longest = 1e30;
-            ray.transmittance = 1.0;
+            ray.optical_depth = 0.0;
             ray.sun = 0.0;
             ray.above = 0.0;
             ray.below = 0.0;
@@ -136,7 +136,7 @@ fn reference(@builtin(global_invocation_id) id: vec3u) {
             let whole = Panel(ray.x, ray.end);
             let points = panel_points(whole);
             let x = panel_depth(whole, ray.density);
-            let weight = ray.transmittance * x * one_minus_exp_over(x);
+            let weight = transmittance_of(ray.optical_depth) * x * one_minus_exp_over(x);
             let first = first_share(x, ray.density);
             var sun = vec2f(0.0);
             if sunlit {
@@ -157,11 +157,11 @@ fn reference(@builtin(global_invocation_id) id: vec3u) {
                 ray.below = sum.below;
                 ray.weight = sum.weight;
                 ray.distance = sum.distance;
-                ray.transmittance *= exp(-x);
+                ray.optical_depth += x;
                 ray.x = ray.end;
             }
         }
-        if empty || (ray.stage == VIEW && (ray.x >= length || ray.transmittance < LEAST_TRANSMITTANCE)) {
+        if empty || (ray.stage == VIEW && (ray.x >= length || ray.optical_depth > OPAQUE)) {
             ray = finished(ray, index, empty);
         }
     }
@@ -174,7 +174,7 @@ fn reference(@builtin(global_invocation_id) id: vec3u) {
 fn finished(given: ReferenceRay, index: u32, empty: bool) -> ReferenceRay {
     var ray = given;
     let sum = Gathered(ray.sun, ray.above, ray.below, ray.weight, ray.distance);
-    let result = vec4f(gathered_radiance(sum), ray.transmittance);
+    let result = vec4f(gathered_radiance(sum), transmittance_of(ray.optical_depth));
     let change = abs(result - ray.previous);
     let dark = DARK * sky_light[2].rgb;
     let steady = all(change.rgb <= quality.tolerance * (result.rgb + dark)) && change.a <= 0.1 * quality.tolerance;

@@ -54,7 +54,9 @@ fn reproject(@builtin(global_invocation_id) id: vec3u) {
     let view = view_direction(vec2f(pixel) + 0.5);
     let away = select(frame.far_distance, distance, distance >= 0.0);
     let before = away * view.xyz + frame.eye_motion - frame.cloud_motion;
-    let was = previous_pixel(normalize(before));
+    // What stands still is where it was, to the bit: a narrow view, a pole of a panorama or a wide picture turn the
+    // rounding of a direction into a good part of a pixel.
+    let was = select(previous_pixel(normalize(before)), vec3f(vec2f(pixel) + 0.5, 1.0), frame.moving == 0u);
     if was.z > 0.0 {
         let old = history_at(was.xy);
         let old_index = nearest_index(was.xy);

@@ -15,7 +15,7 @@ fn sky_map_bake(@builtin(global_invocation_id) id: vec3u) {
     let above = (1.0 - 2.0 * v) * (1.0 - 2.0 * v) * (0.5 * PI + frame.horizon_dip);
     let below = (2.0 * v - 1.0) * (2.0 * v - 1.0) * (0.5 * PI - frame.horizon_dip);
     let elevation = select(-below, above, v < 0.5) - frame.horizon_dip;
-    textureStore(map_out, id.xy, vec4f(air_radiance(sky_direction(azimuth, elevation)), 1.0));
+    textureStore(map_out, id.xy, vec4f(SKY_MAP_SCALE * air_radiance(sky_direction(azimuth, elevation)), 1.0));
 }
 
 // The direction at an azimuth from the sun and an angle above the horizontal plane.
@@ -54,6 +54,7 @@ fn sky_light_bake(@builtin(local_invocation_index) thread: u32) {
     for (var i = 0u; i < 64u; i++) {
         above += partial[i] / 64.0;
     }
+    above *= params.sun.irradiance;
     let middle = 0.5 * (params.clouds.base + params.clouds.top);
     let mu = dot(frame.zenith, frame.sun_direction);
     let ground = select(vec3f(0.0), ground_radiance(mu), params.atmosphere.enabled > 0u);

@@ -1,0 +1,238 @@
+"""Skies, cameras and numerical methods for hypothesis, made from the one definition of the
+parameters: every range and every word comes from the generated classes.
+"""
+
+import dataclasses
+import math
+import re
+import typing
+
+import numpy as np
+from hypothesis import strategies as st
+
+import nubis
+import twin
+from nubis import Camera, ParameterError, Params, Quality
+from test_params import CLASSES, allowed, filled, kind
+
+AIR_TOP = 100_000.0  # m, as in frame.rs
+FARTHEST = 2e8  # m: no eye may be farther from the origin in any coordinate
+
+
+def numbers(low, high):
+    """Numbers of a range: its ends and their neighbours, zero, log-uniform ones, any."""
+    ends = [low, high, math.nextafter(low, high), math.nextafter(high, low), 0.0]
+    most = max(abs(low), abs(high))
+    size = st.floats(-8, math.log10(most)).map(lambda e: min(10**e, most))
+    logarithmic = st.builds(math.copysign, size, st.sampled_from([1.0, -1.0] if low < 0 else [1.0]))
+    inside = st.one_of(st.sampled_from(ends), logarithmic).map(lambda v: min(max(v, low), high))
+    return st.one_of(inside, inside, st.floats(low, high))
+
+
+def whole_numbers(low, high):
+    few = st.integers(low, min(low + 8, high))
+    return st.one_of(st.sampled_from([low, high]), few, st.integers(low, high))
+
+
+# Bakes that take half a second or more: seldom anything but the default.
+COSTLY = {
+    ("clouds", "seed"): st.sampled_from([1] * 60 + [0, 4294967295]),
+    ("clouds", "noise"): st.sampled_from(["nubis2015"] * 60 + ["vsu2022"]),
+    ("high_clouds", "texture_size"): st.sampled_from([16, 17, 64, 512] * 15 + [4096]),
+}
+
+
+@st.composite
+def weather_maps(draw):
+    """All empty, all full, one texel, steps, noise."""
+    size = draw(st.sampled_from([(1, 1), (1, 2), (2, 1), (3, 5), (8, 8)]))
+    values = st.sampled_from([0.0, 1.0, 0.5, 1e-7, math.nextafter(1, 0)])
+    if draw(st.booleans()):
+        return np.full((*size, 3), draw(st.tuples(values, values, values)), dtype=np.float32)
+    steps = draw(st.lists(values, min_size=3 * math.prod(size), max_size=3 * math.prod(size)))
+    return np.array(steps, dtype=np.float32).reshape(*size, 3)
+
+
+def field(group, name):
+    """All values of a parameter."""
+    hint = kind(group, name)
+    if (group, name) in COSTLY:
+        return COSTLY[group, name]
+    if typing.get_origin(hint) is typing.Literal:
+        return st.sampled_from(typing.get_args(hint))
+    if hint is bool:
+        return st.booleans()
+    if name == "map":
+        return st.one_of(st.none(), weather_maps())
+    low, high = allowed(group, name)[1]
+    if hint is int:
+        return whole_numbers(int(low), int(high))
+    one = numbers(low, high)
+    if hint is float:
+        return one
+    count = len(typing.get_args(hint))
+    return st.one_of(one.map(lambda v: filled(hint, v)), st.tuples(*[one] * count))
+
+
+FIELDS = [
+    (group, f.name)
+    for group, cls in CLASSES.items()
+    if group != "quality"
+    for f in dataclasses.fields(cls)
+]
+FLOATS = [f for f in FIELDS if kind(*f) is float]
+
+
+@st.composite
+def grids(draw):
+    """Grids of extinction: empty, full, one voxel, as thin as can be."""
+    shape = draw(st.sampled_from([(1, 1, 1), (2, 3, 4), (1, 8, 8), (8, 1, 1), (5, 5, 5)]))
+    peak = 10.0 ** draw(st.integers(-8, 8))
+    extinction = np.full(shape, draw(st.sampled_from([0.0, peak])), dtype=np.float32)
+    extinction[tuple(draw(st.integers(0, n - 1)) for n in shape)] = peak
+    low = [draw(st.sampled_from([-1e4, -100.0, 0.0, 1000.0])) for _ in range(3)]
+    size = [draw(st.sampled_from([0.01, 1.0, 100.0, 2e4])) for _ in range(3)]
+    return nubis.DensityGrid(
+        extinction, (tuple(low), tuple(a + b for a, b in zip(low, size, strict=True)))
+    )
+
+
+@st.composite
+def params(draw, fields=tuple(FIELDS), **fixed):
+    """A few parameters away from their defaults, or all of them."""
+    few = st.lists(st.sampled_from(fields), unique=True, max_size=10)
+    changed = draw(st.one_of(few, few, st.just(list(fields))))
+    values = {f"{g}.{n}": draw(field(g, n)) for g, n in changed} | fixed
+    base, top = (values.get(f"clouds.{n}", getattr(Params().clouds, n)) for n in ("base", "top"))
+    if np.float32(top) <= np.float32(base):
+        # The thinnest shell that f32 knows, or one of a metre.
+        thin = float(np.nextafter(np.float32(base), np.float32(np.inf)))
+        values["clouds.base"] = base
+        values["clouds.top"] = draw(st.sampled_from([max(thin, 1.0), base + 1.0]))
+    sky = Params().with_(**values)
+    if hasattr(nubis, "DensityGrid") and draw(st.integers(0, 3)) == 0:
+        sky = sky.replace(volume=draw(grids()))
+    return sky
+
+
+def shells(sky):
+    """Altitudes where something begins or ends."""
+    return [0.0, sky.clouds.base, sky.clouds.top, sky.high_clouds.altitude, AIR_TOP]
+
+
+@st.composite
+def eyes(draw, sky, arcs=(0.0, 0.0, 1.0, 1e4, 3e5, 1e7)):
+    """From the middle of the planet to 100 000 km, often a centimetre from a shell."""
+    shell = st.sampled_from(shells(sky))
+    altitude = draw(
+        st.one_of(
+            st.builds(sum, st.tuples(shell, st.sampled_from([-0.01, 0.0, 0.01]))),
+            st.floats(0, 8).map(lambda e: 10**e),
+            st.sampled_from([-100.0, -0.01, 0.0, 2.0, 200.0, 4e5, 3.6e7, 1e8]),
+            st.just(-sky.atmosphere.planet_radius),
+        )
+    )
+    radius = sky.atmosphere.planet_radius
+    angle = draw(st.sampled_from(arcs)) / radius
+    heading = twin.compass(draw(st.sampled_from([0.0, 45.0, 200.0])))
+    zenith = math.sin(angle) * heading + np.array([0, 0, math.cos(angle)])
+    # The distance to sea level under the origin, without the difference of two large numbers.
+    eye = zenith * altitude + radius * (zenith - [0, 0, 1])
+    return tuple(np.clip(eye, -FARTHEST, FARTHEST).tolist())
+
+
+@st.composite
+def directions(draw, sky, eye):
+    """Up, down, level, tangent to a shell, to, from and across the sun, and any."""
+    radius = sky.atmosphere.planet_radius
+    up = np.add(eye, [0, 0, radius])
+    distance = np.linalg.norm(up)
+    up = up / distance if distance > 0 else np.array([0.0, 0, 1])
+    sun = twin.sun_direction(sky)
+    across = np.add(np.cross(sun, [0, 0, 1]), [1e-9, 0, 0])
+    special = [sun, -sun, across, np.cross(sun, across), up, -up]
+    dips = [-math.acos(min((radius + h) / distance, 1)) for h in shells(sky) if distance > 0]
+    elevation = st.one_of(
+        st.sampled_from([0.0, *dips]), st.floats(-math.pi / 2, math.pi / 2), numbers(-0.01, 0.01)
+    )
+
+    @st.composite
+    def slanted(draw):
+        heading = twin.compass(draw(st.floats(0, 360)))
+        level = heading - heading @ up * up
+        level = twin.normalized(level) if np.linalg.norm(level) > 1e-3 else np.cross(up, [0, 1, 0])
+        e = draw(elevation)
+        return math.cos(e) * level + math.sin(e) * up
+
+    return twin.normalized(draw(st.one_of(st.sampled_from(special), slanted(), slanted())))
+
+
+def look(eye, direction, fov=60.0, up=None):
+    """A pinhole that looks along any direction, straight up included."""
+    up = np.eye(3)[np.argmin(np.abs(direction))] if up is None else up
+    return Camera.look_at(eye, np.array(eye) + 1e6 * np.array(direction), up, fov)
+
+
+@st.composite
+def cameras(draw, sky):
+    eye = draw(eyes(sky))
+    projection = draw(st.sampled_from(["perspective", "perspective", "equirect", "fisheye"]))
+    if projection == "equirect":
+        return Camera.equirect(eye)
+    direction = draw(directions(sky, eye))
+    if projection == "fisheye":
+        return Camera.fisheye(eye, direction, draw(numbers(0.001, 360)))
+    return look(eye, direction, draw(st.one_of(numbers(0.001, 179), st.just(60.0))))
+
+
+times = st.one_of(
+    st.just(0.0),
+    st.sampled_from([86_400.0, 30 * 86_400.0, 1e9, -1e9, 1e-9, -1.0, 1.7e308]),
+    numbers(-1e9, 1e9),
+)
+
+
+def words_of_quality():
+    """The names that the package knows, from the error that lists them."""
+    try:
+        nubis.quality("no such method")
+    except ParameterError as error:
+        return re.findall(r'"(\w+)"', str(error).split("must be")[1])
+
+
+NAMES = words_of_quality()
+# Numerical methods that march for long: for pictures of a few pixels.
+SLOW = [name for name in ("reference", "vsu2022", "high") if name in NAMES]
+FEW = {"steps_zenith": 32, "steps_horizon": 64, "light_steps": 6}
+
+
+@st.composite
+def qualities(draw):
+    """A named method, or any with few samples."""
+    named = draw(st.sampled_from([None, None, "draft", "draft", *NAMES]))
+    if named:
+        method, slow = nubis.quality(named), named in SLOW
+    else:
+        values = {}
+        for f in dataclasses.fields(Quality):
+            if kind("quality", f.name) is int and f.name not in ("big_step", "empty_samples"):
+                low = int(allowed("quality", f.name)[1][0])
+                values[f.name] = draw(st.integers(low, FEW.get(f.name, low + 1)))
+            else:
+                values[f.name] = draw(field("quality", f.name))
+        method, slow = Quality(**values), False
+    # Paths are dear: one or two.
+    paths = {f.name: 1 for f in dataclasses.fields(Quality) if "path" in f.name}
+    return method.replace(**paths), slow
+
+
+@st.composite
+def pictures(draw):
+    """A size and a numerical method."""
+    method, slow = draw(qualities())
+    sizes = [(1, 1), (2, 3), (4, 4)]
+    if not slow:
+        sizes += [(8, 6), (5, 7), (13, 3), (1, 33), (8, 6), (5, 7), (13, 3)]
+    if method == nubis.quality("draft"):
+        sizes += [(1, 4096), (4096, 1)]
+    return draw(st.sampled_from(sizes)), method

@@ -156,7 +156,7 @@ def test_single_scattering_is_proportional_to_albedo(renderer):
 
 
 def test_single_scattering_has_no_artistic_part(renderer):
-    """No ambient, no powder, no gain, no cone: changing them changes nothing."""
+    """No ambient, no powder, no gain, no octaves: changing them changes nothing."""
     camera, params = CAMERAS["below"], lit_params(**{"atmosphere.enabled": True})
     art = {
         "light.sun_gain": 3.0,
@@ -166,7 +166,11 @@ def test_single_scattering_has_no_artistic_part(renderer):
         "light.ambient_bottom": (0.0, 1.0, 2.0),
         "light.powder": 1.0,
         "light.rain_absorption": 9.0,
-        "light.cone": 0.5,
+        "light.ambient": (1.0, 2.0, 3.0),
+        "light.octaves": 7,
+        "light.octave_scattering": 0.9,
+        "light.octave_extinction": 0.1,
+        "light.octave_phase": 0.2,
         "light.g_back": -0.7,
         "light.lobe_mix": 0.1,
     }
@@ -177,7 +181,8 @@ def test_single_scattering_has_no_artistic_part(renderer):
 def energy(depth, precipitation=0.0, **light):
     params = nubis.Params().with_(**{f"light.{name}": value for name, value in light.items()})
     inputs = np.stack(np.broadcast_arrays(depth, precipitation), axis=-1)
-    return probe("sun_energy(x.x, x.y)", inputs, imports=["light"], params=params)[:, 0]
+    call = "sun_scattering(x.x, x.y, 1.0) / model_phase(1.0)"
+    return probe(call, inputs, imports=["light"], params=params)[:, 0]
 
 
 DEPTHS = np.concatenate([[0], np.logspace(-6, 4, 60)])
@@ -203,6 +208,23 @@ def test_published_energy(model, rain):
         d = d * (3.0 if rain else 1.0)
         expected = 2 * beer(model, d) * -np.expm1(-2 * d)
     np.testing.assert_allclose(got, expected, rtol=1e-4, atol=1e-6)
+
+
+@pytest.mark.parametrize("count", [1, 3, 8])
+def test_octaves(count):
+    """The sum over octaves of a^i p(g c^i) exp(-b^i depth), times the albedo, as in the papers."""
+    a, b, c, g = 0.6, 0.3, 0.7, 0.8
+    changes = {"octaves": count, "octave_scattering": a, "octave_extinction": b, "octave_phase": c}
+    light = {"light.model": "octaves", "light.g": g, "light.albedo": 0.9}
+    light |= {f"light.{name}": value for name, value in changes.items()}
+    depth, mu = np.meshgrid(DEPTHS, [-1.0, -0.3, 0.5, 1.0])
+    inputs = np.stack([depth.ravel(), 1 - mu.ravel()], axis=-1)
+    call = "sun_scattering(x.x, 0.0, x.y)"
+    got = probe(call, inputs, imports=["light"], params=nubis.Params().with_(**light))[:, 0]
+    i = np.arange(count)[:, None]
+    phase = twin.henyey_greenstein(mu.ravel(), g * c**i)
+    expected = 0.9 * (a**i * phase * np.exp(-(b**i) * depth.ravel())).sum(axis=0)
+    np.testing.assert_allclose(got, expected, rtol=1e-4, atol=1e-9)
 
 
 @pytest.mark.parametrize("model", MODELS)

@@ -130,11 +130,13 @@ STRETCHES = {
 def test_stretches_of_a_ray_inside_the_shell(case):
     """A stretch of no length may start anywhere."""
     *hits, (start, first, gap, second) = STRETCHES[case]
-    top, base, ground = (
+    top, base, _ = (
         f"Hit({near:.1f}, {far:.1f}, {str(hit > 0).lower()}, {str(near > 0).lower()})"
         for near, far, hit in hits
     )
-    call = f"stretches_between({top}, {base}, {ground})"
+    # The ground ends a ray that enters it.
+    ground = hits[2][0] if hits[2][0] > 0 else 1e30
+    call = f"stretches_between({top}, {base}, {ground:.1f})"
     wgsl = f"vec4f({call}.start, {call}.first, {call}.gap, {call}.second)"
     got = probe(wgsl, [0.0], imports=["shell"])[0]
     if first + second == 0:

@@ -325,11 +325,11 @@ class Quality(Block):
     light_steps : int
         Light samples toward the sun, besides the far one. Allowed: a whole number from 1 to 128.
     light_distance : float
-        How far the light samples reach; the far sample stands for as much as four times that,
-        beyond. Allowed: a number from 1 to 100000 m.
+        How far the light samples reach; 0 spreads them to where the clouds end. Allowed: a number
+        from 0 to 100000 m.
     far_sample : bool
-        Whether there is a far light sample, for shadows from distant clouds. Allowed: True or
-        False.
+        Whether there is one more light sample, at three times that reach, for shadows from distant
+        clouds (nubis2015). Allowed: True or False.
     cone : float
         Half width of the cone that the light samples are spread over, as a share of its length
         (nubis2015); 0 looks straight at the sun. Allowed: a number from 0 to 1.
@@ -361,10 +361,10 @@ class Quality(Block):
     big_step: int = 3
     empty_samples: int = 6
     light_steps: int = 8
-    light_distance: float = 2500.0
-    far_sample: bool = True
+    light_distance: float = 0.0
+    far_sample: bool = False
     cone: float = 0.0
-    cheap_light: float = 0.3
+    cheap_light: float = 1.0
     min_transmittance: float = 0.01
     jitter: bool = True
     view_distance: float = 400000.0

@@ -69,13 +69,14 @@ fn first_share(depth: f32, density: vec2f) -> f32 {
     return weight.x / max(weight.x + weight.y, 1e-30);
 }
 
-// The smallest feature of the procedural field, m: a texel of the base shape or of the detail. The grid's cells end its
-// panels themselves.
+// The smallest feature of the procedural field, m: a texel of the base shape or of the detail, or a part of the profile by
+// height. The grid's cells end its panels themselves.
 fn finest_feature() -> f32 {
     if VOLUME {
         return 1e30;
     }
-    return min(params.clouds.shape_scale / 128.0, params.clouds.detail_scale / 32.0);
+    let profile = (params.clouds.top - params.clouds.base) / 128.0;
+    return min(min(params.clouds.shape_scale / 128.0, params.clouds.detail_scale / 32.0), profile);
 }
 
 // The longest panel that sees what no level of detail smooths: the profile by height, and a texel of the weather map.

@@ -11,12 +11,8 @@ use clouds_core::camera::{Camera as CoreCamera, Convention, Projection};
 use clouds_core::gpu::{self, lock};
 use clouds_core::params::{Params, Quality};
 use clouds_core::renderer::Renderer as CoreRenderer;
-<<<<<<< HEAD
-use clouds_core::{DensityGrid as CoreGrid, Error, Result, color, files, params, schema};
-=======
 use clouds_core::schema::Value;
-use clouds_core::{Error, Result, color, files, params, schema};
->>>>>>> stress
+use clouds_core::{DensityGrid as CoreGrid, Error, Result, color, files, params, schema};
 use glam::DVec3;
 use numpy::{PyArray1, PyArrayMethods as _, PyReadonlyArrayDyn, PyUntypedArrayMethods as _};
 use pyo3::prelude::*;
@@ -607,11 +603,7 @@ fn write_hdr(py: Python<'_>, path: PathBuf, frame: PyReadonlyArrayDyn<'_, f32>) 
 mod _nubis {
     #[pymodule_export]
     use super::{
-<<<<<<< HEAD
-        Camera, DensityGrid, Renderer, adapters, check, check_params, check_quality, quality, to_srgb8, write_exr,
-=======
-        Camera, Renderer, adapters, check, check_params, check_quality, number, quality, to_srgb8, write_exr,
->>>>>>> stress
+        Camera, DensityGrid, Renderer, adapters, check, check_params, check_quality, number, quality, to_srgb8, write_exr,
         write_hdr, write_png,
     };
 }

@@ -122,11 +122,13 @@ def test_single_scattering(renderer, quality, name):
     assert (layers["radiance"][dark] == 0).all()
 
 
-def test_order_of_convergence(renderer):
+@pytest.mark.parametrize("name", ["blob_beside", "cumulus_inside", "rough_inside"])
+def test_order_of_convergence(renderer, name):
     """Equal steps, twice as many each time, against what was stored: the error falls with the
-    square of the step.
+    square of the step. From inside, as where a ray begins and ends in nothing even samples at the
+    start of steps are of second order.
     """
-    case, want = stored("exact_blob_beside")
+    case, want = stored(f"exact_{name}")
     steps = np.array([24, 48, 96, 192])
     camera, params = scene(case)
     error = []
@@ -304,20 +306,21 @@ def agree(image, error, expected, expected_error):
     got, noise = tiles(image), np.sqrt(tiles(error**2) / 64)
     expected, expected_error = expected[..., None], expected_error[..., None]
     sigma = np.hypot(noise, expected_error)
-    lit = sigma > 0
+    # In a tile that few paths brighten, they may all be missing, and no error with them.
+    lit = np.broadcast_to(expected > 0.05 * expected.max(), got.shape)
     assert lit.mean() > 0.3
-    z = (got - expected)[lit] / sigma[lit]
+    z = ((got - expected) / np.where(lit, sigma, 1))[lit]
     assert np.abs(z).max() < 4
-    assert (got[~lit] == 0).all()
+    assert np.abs(got - expected)[~lit].max(initial=0) < 0.03 * expected.max()
     # Too large an error of its own would let anything pass.
-    assert np.median(noise[lit] / got[lit]) < 0.3
-    colours = got.mean(axis=(0, 1))
+    assert np.median(noise[lit] / got[lit]) < 0.15
     sigma = np.sqrt((sigma**2).sum(axis=(0, 1))) / expected.size
-    limit = np.maximum(0.005 * expected.mean(), 4 * sigma)
-    assert (np.abs(colours - expected.mean()) < limit).all()
+    bias = got.mean(axis=(0, 1)) - expected.mean()
+    assert (np.abs(bias) < np.maximum(0.005 * expected.mean(), 4 * sigma)).all()
 
 
-SAMPLES = {"tau_5": 256, "tau_20": 256, "tau_60": 256, "events_4": 256}
+# Paths a pixel: fewer where they are long, more where single ones are bright.
+SAMPLES = {"tau_5": 256, "events_4": 256, "tau_20": 128, "tau_60": 384}
 
 
 @pytest.mark.parametrize("name", MITSUBA)

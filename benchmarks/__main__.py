@@ -22,17 +22,23 @@ QUICK = reference.CACHE / "quick"
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks",
-        description="Measure the error of every method against its time. NUBIS_ADAPTER chooses the adapter.",
+        description="Measure the error of every method against its time.",
+        epilog="NUBIS_ADAPTER chooses the adapter.",
     )
     names = [m.name for m in methods.full()]
     parser.add_argument("--scenes", nargs="+", metavar="S", choices=list(nubis.scenes))
     parser.add_argument(
-        "--methods", nargs="+", metavar="M", help=f"names or families of methods: {', '.join(names)}"
+        "--methods",
+        nargs="+",
+        metavar="M",
+        help=f"names or families of methods: {', '.join(names)}",
     )
     parser.add_argument("--size", metavar="WxH", help="pixels (default: 192x108)")
     parser.add_argument("--repeats", type=int, help="renders by the clock, 5 unless --quick")
     parser.add_argument("--quick", action="store_true", help="a little of everything, 64x36")
-    parser.add_argument("--parts", nargs="+", choices=["error", "shapes"], default=["error", "shapes"])
+    parser.add_argument(
+        "--parts", nargs="+", choices=["error", "shapes"], default=["error", "shapes"]
+    )
     parser.add_argument("--out", type=Path, help=f"folder of the results (default: {RESULTS})")
     parser.add_argument(
         "--plots-only", action="store_true", help="draw again what was measured, and write the page"
@@ -60,7 +66,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         page.write(out)
 
 
-def _measure(parser: argparse.ArgumentParser, args: argparse.Namespace, out: Path, command: str) -> None:
+def _measure(
+    parser: argparse.ArgumentParser, args: argparse.Namespace, out: Path, command: str
+) -> None:
     width, _, height = (args.size or ("64x36" if args.quick else "192x108")).partition("x")
     if not (width.isdecimal() and height.isdecimal()):
         parser.error(f"--size: {args.size!r} is no size such as 192x108")

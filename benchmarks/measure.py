@@ -93,7 +93,7 @@ def header(command: list[str]) -> Row:
         "date": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         "adapter": nubis.Renderer(1, 1).adapter._asdict(),
         "cpu": _cpu(),
-        "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
+        "cores": os.cpu_count(),
         "platform": platform.platform(),
         "command": " ".join(["python -m", *command]),
     }

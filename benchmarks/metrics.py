@@ -17,8 +17,8 @@ CLOUD = 1e-3
 
 def errors(test: Layers, reference: Layers) -> dict[str, float | None]:
     """Return every error of the layers of a picture."""
-    x, r = (np.float64(layers["radiance"]) for layers in (test, reference))
-    t, t_ref = (np.float64(layers["transmittance"]) for layers in (test, reference))
+    x, r = (layers["radiance"].astype(float) for layers in (test, reference))
+    t, t_ref = (layers["transmittance"].astype(float) for layers in (test, reference))
     cloud = t_ref < np.exp(-CLOUD)
     difference = x[cloud] - r[cloud]
     mean = r[cloud].mean() if cloud.any() else np.nan
@@ -34,7 +34,8 @@ def errors(test: Layers, reference: Layers) -> dict[str, float | None]:
 
 def composed(layers: Layers, sky: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
     """The picture: clouds in front of a sky, which is the reference's own for every method."""
-    return np.float32(layers["radiance"] + layers["transmittance"][..., None] * sky)
+    picture = layers["radiance"] + layers["transmittance"][..., None] * sky
+    return picture.astype(np.float32)
 
 
 def flip(test: npt.NDArray[Any], reference: npt.NDArray[Any]) -> float | None:

@@ -357,6 +357,7 @@ def _soak(soak: Row) -> str:
     half = memory[len(memory) // 2]
     equal = "equals" if soak["still_equals_new_process"] else "**differs from**"
     static = "equals" if soak["static_shot_equals_still"] else "**differs from**"
+    growth = soak["memory_growth_mib_per_1000_frames"]
     return (
         _about(soak["header"])
         + f"\n\n{soak['frames']} frames in {soak['seconds']:.0f} s, with {soak['cuts']} cuts. "
@@ -366,6 +367,6 @@ def _soak(soak: Row) -> str:
         f"those of a new renderer. The last still {equal} that of a new process byte for byte; a "
         f"static shot {static} the still byte for byte. The last frame, held for "
         f"{soak['held_frames']} frames, is {_percent(soak['held_rel_rmse'])} (relative RMSE) "
-        f"from the still. Memory: {half[1]:.0f} MiB at frame {half[0]}, {memory[-1][1]:.0f} MiB at the end, "
-        f"{soak['memory_growth_mib_per_1000_frames']:+.2f} MiB in 1000 frames over the second half."
+        f"from the still. Memory: {half[1]:.0f} MiB at frame {half[0]}, "
+        f"{memory[-1][1]:.0f} MiB at the end, {growth:+.2f} MiB in 1000 frames over the second half."
     )

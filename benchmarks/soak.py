@@ -19,6 +19,7 @@ from collections.abc import Iterator, Sequence
 from math import cos, pi, sin
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 from tqdm import tqdm
@@ -69,7 +70,7 @@ def shot(i: int) -> Shot:
     return camera, params, float(rng.uniform(0, 1e6)) + since / 24
 
 
-def run(frames: int) -> dict[str, object]:
+def run(frames: int) -> dict[str, Any]:
     """Render the frames; return what was seen."""
     renderer = nubis.Renderer(*SIZE, quality="draft")
     memory: list[tuple[int, float]] = []
@@ -100,8 +101,8 @@ def run(frames: int) -> dict[str, object]:
     static = next(renderer.animate([last]))
     held = np.sqrt(np.mean((frame - still)[..., :3] ** 2)) / still[..., :3].mean()
     with multiprocessing.get_context("spawn").Pool(1) as pool:
-        afresh = pool.apply(_afresh, (frames - 1,))
-    # The first shots of each kind fill caches; growth is what comes after half of the run.
+        afresh = pool.apply(_afresh, last)
+    # The first shots fill caches; growth is what comes after half of the run.
     index, mib = np.array(memory[len(memory) // 2 :]).T
     return {
         "frames": frames,
@@ -122,7 +123,7 @@ def run(frames: int) -> dict[str, object]:
     }
 
 
-def faults(found: dict[str, object]) -> list[str]:
+def faults(found: dict[str, Any]) -> list[str]:
     """What is wrong with a run, in words."""
     checks = {
         "a frame is not finite": not found["broken_frames"],
@@ -135,8 +136,7 @@ def faults(found: dict[str, object]) -> list[str]:
     return [fault for fault, holds in checks.items() if not holds]
 
 
-def _afresh(i: int) -> bytes:
-    camera, params, time = shot(i)
+def _afresh(camera: nubis.Camera, params: nubis.Params, time: float) -> bytes:
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "no hardware Vulkan adapter")
         renderer = nubis.Renderer(*SIZE, quality="draft")

@@ -91,6 +91,7 @@ def _presets(means: list[Row]) -> str:
         "quality",
         "ms",
         "p95",
+        "set-up",
         "evaluations",
         "rel. RMSE",
         "bias",
@@ -104,6 +105,7 @@ def _presets(means: list[Row]) -> str:
             f"`{m['method']}`",
             _number(1000 * m["seconds"]),
             _number(1000 * m["seconds_p95"]),
+            _number(1000 * m["setup_seconds"]),
             _number(m["evaluations"]),
             _percent(m["rel_rmse"]),
             _percent(m["bias"], "+"),
@@ -368,5 +370,5 @@ def _soak(soak: Row) -> str:
         f"static shot {static} the still byte for byte. The last frame, held for "
         f"{soak['held_frames']} frames, is {_percent(soak['held_rel_rmse'])} (relative RMSE) "
         f"from the still. Memory: {half[1]:.0f} MiB at frame {half[0]}, "
-        f"{memory[-1][1]:.0f} MiB at the end, {growth:+.2f} MiB in 1000 frames over the second half."
+        f"{memory[-1][1]:.0f} MiB at the end, {growth:+.2f} MiB a 1000 frames over the second half."
     )

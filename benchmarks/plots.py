@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterable, Sequence
 from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -52,7 +52,10 @@ def draw(folder: Path) -> list[Path]:
 
 
 def geometric_mean(rows: Iterable[Row]) -> list[Row]:
-    """Of times, evaluations and errors over the scenes: a row for each method, in their order."""
+    """Of times, evaluations and errors over the scenes: a row for each method, in their order.
+
+    Biases are averaged, of set-ups it is the median and of `t_max` the largest.
+    """
     by_method: dict[str, list[Row]] = {}
     for row in rows:
         by_method.setdefault(row["method"], []).append(row)
@@ -65,6 +68,7 @@ def geometric_mean(rows: Iterable[Row]) -> list[Row]:
             logs = np.log(np.maximum(values, 1e-12))  # an error may be exactly 0
             mean[name] = float(np.exp(logs.mean())) if values else None
         mean["bias"] = float(np.mean([row["bias"] for row in same]))
+        mean["setup_seconds"] = float(np.median([row["setup_seconds"] for row in same]))
         mean["t_max"] = max(row["t_max"] for row in same)
         means.append(mean)
     return means
@@ -107,32 +111,48 @@ def _errors(path: Path, title: str, rows: list[Row], x: str) -> Path:
         span = f"1/{first} … 1/{last}" if "resolution" in family else f"{first} … {last}"
         axes.plot(xs, ys, color=colour, marker=marker, ms=4.5, lw=1.3, label=f"{family} {span}")
         axes.axhline(ys[-1], color=colour, ls=":", lw=1)
-    presets = sorted((row for row in rows if is_preset(row)), key=lambda row: row[x])
-    for i, row in enumerate(presets):
-        axes.plot(row[x], row["rel_rmse"], "o", ms=9, mfc="none", mec="black", mew=1.5, zorder=5)
-        # To and fro, so that neighbours do not cover each other.
-        axes.annotate(
-            row["method"],
-            (row[x], row["rel_rmse"]),
-            xytext=(0, 11 if i % 2 else -17),
-            textcoords="offset points",
-            ha="center",
-            fontsize=9,
-            weight="bold",
-            zorder=6,
-            bbox={"facecolor": "white", "alpha": 0.7, "lw": 0, "pad": 0.5},
-        )
     axes.set(xscale="log", yscale="log", xlabel=AXES[x], ylabel=ERROR, title=title)
     axes.margins(x=0.08)
     for side in (axes.xaxis, axes.yaxis):
         side.set_major_locator(LogLocator(subs=(1, 2, 5)))
         side.set_major_formatter("{x:g}")
         side.set_minor_formatter(NullFormatter())
+    _name_presets(axes, [row for row in rows if is_preset(row)], x)
     axes.grid(which="both", color="0.92")
     axes.set_axisbelow(True)
     axes.plot([], [], color="0.3", ls=":", lw=1, label="floor: error of a family's finest setting")
     figure.legend(loc="outside lower center", ncols=2, fontsize=8, frameon=False)
     return _save(figure, path)
+
+
+def _name_presets(axes: Axes, presets: list[Row], x: str) -> None:
+    """Circles with names, each on the side where it is farthest from the other ones."""
+    at = np.array([[row[x], row["rel_rmse"]] for row in presets])
+    axes.plot(*at.T, "o", ms=9, mfc="none", mec="black", mew=1.5, zorder=5)
+    at = axes.transData.transform(at)
+    taken: list[Any] = []
+    for i, row in enumerate(presets):
+        others = [*np.delete(at, i, axis=0), *taken]
+        # A name is about three times as wide as high.
+        shape = np.array([1 / 3, 1])
+        sides = np.array([[0, 16], [0, -16], [48, 0], [-48, 0]])
+        room = [
+            min((np.hypot(*((at[i] + s - o) * shape)) for o in others), default=0) for s in sides
+        ]
+        offset = sides[int(np.argmax(np.minimum(room, 24)))]
+        taken.append(at[i] + offset)
+        axes.annotate(
+            row["method"],
+            (row[x], row["rel_rmse"]),
+            xytext=offset * 72 / axes.figure.dpi,
+            textcoords="offset points",
+            ha="center",
+            va="center",
+            fontsize=9,
+            weight="bold",
+            zorder=6,
+            bbox={"facecolor": "white", "alpha": 0.7, "lw": 0, "pad": 0.5},
+        )
 
 
 def _shapes(path: Path, sweeps: Sequence[Row]) -> Path:

@@ -194,11 +194,13 @@ def test_quick_page(quick, tmp_path):
 def test_geometric_mean():
     rows = [
         {"method": "a", "family": "a", "scene": s, "bias": b, "t_max": t, "flip": None}
+        | {"setup_seconds": v}
         | {n: v for n in ("seconds", "seconds_p95", "evaluations", "rel_rmse", "p999", "t_rmse")}
         for s, b, t, v in [("x", 0.5, 0.1, 2.0), ("y", -0.1, 0.3, 8.0)]
     ]
     (mean,) = plots.geometric_mean(rows)
     assert mean["seconds"] == mean["rel_rmse"] == pytest.approx(4)
+    assert mean["setup_seconds"] == pytest.approx(5)
     assert mean["bias"] == pytest.approx(0.2) and mean["t_max"] == 0.3 and mean["flip"] is None
 
 

@@ -12,10 +12,10 @@ export VIRTUAL_ENV := $(CURDIR)/$(VENV)
 unexport CONDA_PREFIX
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help setup build generate render test stress types lint bench clean
+.PHONY: help setup build generate render gallery test stress types lint bench bench-kernels soak clean
 
 help: ## List the commands
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 # Asks apt for nothing when all is there.
 setup: ## Install what is missing (Debian, Ubuntu): software Vulkan driver, C linker, venv
@@ -78,8 +78,19 @@ lint: types ## Check format, style and types
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 
-bench: setup ## Time a small frame and each of its kernels (NUBIS_ADAPTER chooses the adapter)
+$(VENV)/bench: pyproject.toml $(VENV)/ready
+	PIP_QUIET=1 $(BIN)/maturin develop --release --extras bench
+	@touch $@
+
+bench: build $(VENV)/bench ## Measure error against time into benchmarks/results, docs/accuracy.md (25 min on two cores)
+	$(BIN)/python -m benchmarks
+
+bench-kernels: setup ## Time a small frame and each of its kernels (NUBIS_ADAPTER chooses the adapter)
 	cargo bench --bench frame
+
+soak: build $(VENV)/bench ## Render 10 000 animated frames and look for drift and growth
+	$(BIN)/python -m benchmarks.soak
+	$(BIN)/python -m benchmarks --plots-only
 
 clean: ## Remove everything that was made
 	rm -rf target $(VENV) out python/nubis/*.so

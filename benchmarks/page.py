@@ -1,0 +1,374 @@
+"""Writes the results into docs/accuracy.md, between markers: tables, and all prose with numbers."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.measure import Row
+from benchmarks.plots import geometric_mean, is_preset, pareto
+
+PAGE = Path(__file__).parents[1] / "docs" / "accuracy.md"
+
+
+def write(folder: Path, page: Path = PAGE) -> None:
+    """Bring the page up to date with the results in `folder`; the rest of it stays as it is."""
+    text = page.read_text()
+    blocks = {}
+    if (results := _read(folder, "results.json")) is not None:
+        rows = results["rows"]
+        blocks["about the errors"] = _about(results["header"]) + _reference(results["header"])
+        blocks["presets"] = _presets(geometric_mean(rows))
+        blocks["scenes"] = _scenes(rows)
+        blocks["reading"] = _reading(rows)
+        names = ["summary", *results["header"]["seeds"]]
+        blocks["plots"] = _plots(folder, page, names)
+    if (shapes := _read(folder, "shapes.json")) is not None:
+        blocks["about the shapes"] = _about(shapes["header"])
+        blocks["shapes"] = _shapes(shapes) + "\n\n" + _image(folder, page, "shapes")
+    if (soak := _read(folder, "soak.json")) is not None:
+        blocks["soak"] = _soak(soak) + "\n\n" + _image(folder, page, "soak")
+    for name, block in blocks.items():
+        text = fill(text, name, block)
+    page.write_text(text)
+
+
+def fill(text: str, name: str, block: str) -> str:
+    """Put `block` between the markers called `name`."""
+    begin, end = f"<!-- begin {name} -->", f"<!-- end {name} -->"
+    if text.count(begin) != 1 or text.count(end) != 1:
+        raise ValueError(f"the page needs the markers {begin} and {end}, once each")
+    between = re.escape(begin) + ".*?" + re.escape(end)
+    return re.sub(between, lambda _: f"{begin}\n{block}\n{end}", text, flags=re.DOTALL)
+
+
+def _read(folder: Path, name: str) -> Row | None:
+    path = folder / name
+    return json.loads(path.read_text()) if path.exists() else None
+
+
+def _about(header: Row) -> str:
+    adapter = header["adapter"]
+    width, height = header["size"]
+    renders = f", median of {header['repeats']} renders" if "repeats" in header else ""
+    return (
+        f"Measured {header['date']} on {adapter['name']} ({adapter['kind']}, {adapter['driver']}), "
+        f"{header['cpu']}, {header['cores']} cores; nubis {header['version']}, shaders "
+        f"{header['shaders']}, {width}×{height}{renders}; `{header['command']}`."
+    )
+
+
+def _reference(header: Row) -> str:
+    if not header["reference"]["stand_in"]:
+        return ' The reference is `quality="reference"`.'
+    quality = header["reference"]["quality"]
+    return (
+        f" **The reference is a stand-in**: `high` with {quality['steps_horizon']} view steps and "
+        f"{quality['light_steps']} light steps; errors near its own are not to be trusted."
+    )
+
+
+def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    lines = [head, ["---"] + ["---:"] * (len(head) - 1), *rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def _percent(value: float, sign: str = "") -> str:
+    return f"{100 * value:{sign}.2g} %" if abs(value) < 0.1 else f"{100 * value:{sign}.0f} %"
+
+
+def _number(value: float | None) -> str:
+    return "–" if value is None else f"{value:.3g}" if value < 100 else f"{value:.0f}"
+
+
+def _presets(means: list[Row]) -> str:
+    head = (
+        "quality",
+        "ms",
+        "p95",
+        "set-up",
+        "evaluations",
+        "rel. RMSE",
+        "bias",
+        "p99.9",
+        "T RMSE",
+        "T max",
+        "HDR-FLIP",
+    )
+    rows = [
+        (
+            f"`{m['method']}`",
+            _number(1000 * m["seconds"]),
+            _number(1000 * m["seconds_p95"]),
+            _number(1000 * m["setup_seconds"]),
+            _number(m["evaluations"]),
+            _percent(m["rel_rmse"]),
+            _percent(m["bias"], "+"),
+            _number(m["p999"]),
+            _number(m["t_rmse"]),
+            _number(m["t_max"]),
+            _number(m["flip"]),
+        )
+        for m in means
+        if is_preset(m)
+    ]
+    return _table(head, rows)
+
+
+def _scenes(rows: list[Row]) -> str:
+    presets = list(dict.fromkeys(row["method"] for row in rows if is_preset(row)))
+    found = {(row["scene"], row["method"]): row for row in rows}
+    scenes = dict.fromkeys(row["scene"] for row in rows)
+
+    def cell(scene: str, preset: str) -> str:
+        row = found[scene, preset]
+        return f"{_percent(row['rel_rmse'])} ({_number(1000 * row['seconds'])} ms)"
+
+    head = ["scene", *(f"`{preset}`" for preset in presets)]
+    return _table(head, ([f"`{s}`", *(cell(s, p) for p in presets)] for s in scenes))
+
+
+def _reading(rows: list[Row]) -> str:
+    means = geometric_mean(rows)
+    presets = [m for m in means if is_preset(m)]
+    front = {m["method"] for m in pareto(means)}
+    lines = []
+    on = [f"`{m['method']}`" for m in presets if m["method"] in front]
+    lines.append(f"Named qualities on the Pareto front of the mean: {', '.join(on) or 'none'}.")
+    for preset in presets:
+        if preset["method"] in front:
+            continue
+        as_good = [m for m in means if m["rel_rmse"] <= preset["rel_rmse"]]
+        cheap = min(as_good, key=lambda m: m["seconds"])
+        in_time = [m for m in means if m["seconds"] <= preset["seconds"]]
+        good = min(in_time, key=lambda m: m["rel_rmse"])
+        lines.append(
+            f"`{preset['method']}`: its error of {_percent(preset['rel_rmse'])} is had in "
+            f"{_percent(cheap['seconds'] / preset['seconds'])} of its time by `{cheap['method']}`; "
+            f"in its time `{good['method']}` errs by {_percent(good['rel_rmse'])}."
+        )
+    for base in dict.fromkeys(m["family"].split(":")[0] for m in means if not is_preset(m)):
+        lines += _limits(base, means)
+    for preset in presets:
+        same = [row for row in rows if row["method"] == preset["method"]]
+        worst = max(same, key=lambda row: row["rel_rmse"])
+        tilted = max(same, key=lambda row: abs(row["bias"]))
+        lines.append(
+            f"`{preset['method']}` is farthest off in `{worst['scene']}` "
+            f"({_percent(worst['rel_rmse'])}); its largest bias is "
+            f"{_percent(tilted['bias'], '+')}, in `{tilted['scene']}`."
+        )
+    return "\n".join(f"- {line}" for line in lines)
+
+
+def _limits(base: str, means: list[Row]) -> list[str]:
+    """What the error of a quality is made of: which knob takes most of it away."""
+    start = next((m for m in means if m["method"] == base), None)
+    families = {m["family"]: m for m in means}  # the last of each is its finest
+    view, light = families.get(f"{base}: view steps"), families.get(f"{base}: light steps")
+    lines = []
+    if start and view and light:
+        less = min(view, light, key=lambda m: m["rel_rmse"])
+        more = "view steps" if less is view else "light steps"
+        lines.append(
+            f"From `{base}`, whose error is {_percent(start['rel_rmse'])}, {view['value']} view "
+            f"steps alone lead to {_percent(view['rel_rmse'])} and {light['value']} light steps "
+            f"alone to {_percent(light['rel_rmse'])}: "
+            + (
+                f"more {more} help most."
+                if less["rel_rmse"] < 0.9 * start["rel_rmse"]
+                else "neither alone removes a tenth of it; it comes from what both leave as it is."
+            )
+        )
+    half = next((m for m in means if m["method"] == f"{base}: resolution 1/2"), None)
+    if start and half:
+        lines.append(
+            f"`{base}` at half the resolution takes "
+            f"{_percent(half['seconds'] / start['seconds'])} of the time; its error is "
+            f"{_percent(half['rel_rmse'])}, its bias {_percent(half['bias'], '+')}."
+        )
+    return lines
+
+
+def _image(folder: Path, page: Path, name: str) -> str:
+    path = os.path.relpath(folder / "plots" / f"{name}.png", page.parent)
+    return f"![{name}]({Path(path).as_posix()})"
+
+
+def _plots(folder: Path, page: Path, names: Sequence[str]) -> str:
+    return "\n\n".join(
+        f"{_image(folder, page, f'{name}-seconds')}\n{_image(folder, page, f'{name}-evaluations')}"
+        for name in names
+    )
+
+
+def _shapes(shapes: Row) -> str:
+    sweeps = {sweep["name"]: sweep for sweep in shapes["sweeps"]}
+    pixels = shapes["header"]["size"][0] * shapes["header"]["size"][1]
+    parts = [_table_of_sweeps(sweeps.values())]
+    notes = [_note(sweep, pixels) for name, sweep in sweeps.items() if name.startswith("table")]
+    notes += _coverage(sweeps["table 4"]) if "table 4" in sweeps else []
+    notes += _resolutions(sweeps)
+    parts.append("\n".join(f"- {note}" for note in notes))
+    if shapes["factors"]:
+        parts.append(_factors(shapes["factors"]))
+    if shapes["bakes"]:
+        parts.append(_bakes(shapes["bakes"]))
+    if shapes["switches"]:
+        parts.append(_switches(shapes["switches"]))
+    return "\n\n".join(parts)
+
+
+def _table_of_sweeps(sweeps: Iterable[Row]) -> str:
+    def line(sweep: Row) -> list[str]:
+        published = sweep["published_fit"]
+        times = {row["value"]: row["seconds"] for row in sweep["rows"]}
+        known = dict(sweep["published_ms"])
+        both = [value for value in times if value in known]
+        growth = ["–", "–", "–"]
+        if len(both) > 1:
+            a, b = both[0], both[-1]
+            growth = [
+                f"{a:g} → {b:g}",
+                f"×{_number(times[b] / times[a])}",
+                f"×{_number(known[b] / known[a])}",
+            ]
+        return [
+            sweep["title"],
+            _number(1000 * sweep["fit"]["slope"]),
+            f"{sweep['fit']['r2']:.3f}",
+            f"{published['r2']:.3f}" if published else "–",
+            *growth,
+        ]
+
+    head = ["", "slope, ms", "R²", "R² published", "from → to", "time grows", "published"]
+    return _table(head, map(line, sweeps))
+
+
+def _note(sweep: Row, pixels: int) -> str:
+    """Whether it is a line, and what the time follows."""
+    r2 = sweep["fit"]["r2"]
+    line = "is a line" if r2 >= 0.97 else "is nearly a line" if r2 >= 0.9 else "is no line"
+    costs = [1e9 * row["seconds"] / row["evaluations"] / pixels for row in sweep["rows"]]
+    return (
+        f"{sweep['name'].capitalize()}: time against {sweep['knob']} {line} (R² {r2:.3f}). Against "
+        f"density evaluations a pixel R² is {sweep['fit_by_evaluations']['r2']:.3f}, and "
+        f"{sweep['fit_by_evaluations_in_step']['r2']:.3f} if eight neighbours wait for the "
+        "longest of them, as they do on lavapipe. An evaluation takes "
+        f"{min(costs):.0f} to {max(costs):.0f} ns."
+    )
+
+
+def _coverage(sweep: Row) -> list[str]:
+    rows = sweep["rows"]
+    first, last = rows[0], rows[-1]
+    dearest = max(rows, key=lambda row: row["seconds"])
+    notes = []
+    if dearest is not last:
+        notes.append(
+            f"Coverage makes a frame dearer up to {dearest['value']:g} only: at 1 it takes "
+            f"{_percent(last['seconds'] / dearest['seconds'])} of that time. Pixels with cloud go "
+            f"from {_percent(first['cloudy'])} at {first['value']:g} to "
+            f"{_percent(dearest['cloudy'])} and {_percent(last['cloudy'])}, but rays that end in "
+            f"opaque cloud go from {_percent(first['opaque'])} to "
+            f"{_percent(dearest['opaque'])} and {_percent(last['opaque'])}, so that a cloudy pixel "
+            f"takes {_number(dearest['evaluations_cloudy'])} evaluations there and "
+            f"{_number(last['evaluations_cloudy'])} at 1. The published sky keeps getting dearer."
+        )
+    if clear := [row["value"] for row in rows if row["cloudy"] == 0]:
+        notes.append(f"Up to coverage {max(clear):g} no cloud is in view: only the search is paid.")
+    return notes
+
+
+def _resolutions(sweeps: dict[str, Row]) -> list[str]:
+    figure = {name[-1]: s for name, s in sweeps.items() if name.startswith("figure 41")}
+    if "1" not in figure:
+        return []
+    whole = figure["1"]["rows"][-1]
+    shares = [
+        f"1/{divisor} {_percent(sweep['rows'][-1]['seconds'] / whole['seconds'])} "
+        f"({_percent(1 / int(divisor) ** 2)} of the pixels)"
+        for divisor, sweep in figure.items()
+        if divisor != "1"
+    ]
+    return [
+        f"Figure 41: at {whole['value']} view steps the resolutions take, of the time of the "
+        f"whole: {', '.join(shares)}. More than their share of pixels is what a frame costs at "
+        "any size: submissions, waits, copies."
+    ]
+
+
+def _factors(rows: list[Row]) -> str:
+    """How much each of three factors multiplies the time, the others being equal (table 6)."""
+
+    def effect(name: str, key: str) -> float:
+        others = [n for n in ("steps", "coverage", "light_steps") if n != name]
+        low, high = sorted({row[name] for row in rows})
+        found = {(row[name], *(row[n] for n in others)): row[key] for row in rows}
+        logs = [np.log(found[high, *rest] / t) for (v, *rest), t in found.items() if v == low]
+        return float(np.exp(np.mean(logs)))
+
+    lines = []
+    for name, title in [
+        ("steps", "view steps 100 → 200"),
+        ("coverage", "coverage 0.3 → 0.8"),
+        ("light_steps", "light steps doubled (50 → 100; published 100 → 200)"),
+    ]:
+        measured, published = effect(name, "seconds"), effect(name, "published_ms")
+        lines.append((title, f"×{measured:.2f}", f"×{published:.2f}"))
+    return "Table 6, by its three factors (geometric mean over the others):\n\n" + _table(
+        ["", "time grows", "published"], lines
+    )
+
+
+def _bakes(bakes: Row) -> str:
+    measured, published = bakes["passes_ms"], bakes["published_ms"]
+    lines = [(name, _number(ms), _number(published.get(name))) for name, ms in measured.items()]
+    lines.append(
+        ("all, by the clock", _number(bakes["clock_ms"]), _number(bakes["published_clock_ms"]))
+    )
+    note = ""
+    if "shape" in measured and "detail" in measured:
+        note = (
+            f" The base shape has 64 times the texels of the detail and takes "
+            f"{_number(measured['shape'] / measured['detail'])} times as long; published is "
+            f"{_number(published['shape'] / published['detail'])}, which is not the work of "
+            "sixty-four times as many texels."
+        )
+    return f"Table 2, the noises, which are baked once.{note}\n\n" + _table(
+        ["noise", "ms", "published, ms"], lines
+    )
+
+
+def _switches(rows: list[Row]) -> str:
+    lines = [
+        (row["switch"], _number(row["evaluations"]), _number(1000 * row["seconds"])) for row in rows
+    ]
+    return "What the optimisations of thesis2018 save (its figure 39):\n\n" + _table(
+        ["with", "evaluations a pixel", "ms"], lines
+    )
+
+
+def _soak(soak: Row) -> str:
+    memory = soak["memory_mib"]
+    half = memory[len(memory) // 2]
+    equal = "equals" if soak["still_equals_new_process"] else "**differs from**"
+    static = "equals" if soak["static_shot_equals_still"] else "**differs from**"
+    growth = soak["memory_growth_mib_per_1000_frames"]
+    return (
+        _about(soak["header"])
+        + f"\n\n{soak['frames']} frames in {soak['seconds']:.0f} s, with {soak['cuts']} cuts. "
+        f"{soak['broken_frames']} frames had a number that is not finite; values lie between "
+        f"{_number(soak['lowest'])} and {_number(soak['highest'])} (the sun's disc). Of "
+        f"{soak['stills_compared']} stills after cuts {soak['stills_that_differ']} differ from "
+        f"those of a new renderer. The last still {equal} that of a new process byte for byte; a "
+        f"static shot {static} the still byte for byte. The last frame, held for "
+        f"{soak['held_frames']} frames, is {_percent(soak['held_rel_rmse'])} (relative RMSE) "
+        f"from the still. Memory: {half[1]:.0f} MiB at frame {half[0]}, "
+        f"{memory[-1][1]:.0f} MiB at the end, {growth:+.2f} MiB a 1000 frames over the second half."
+    )

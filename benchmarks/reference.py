@@ -1,0 +1,63 @@
+"""What the methods are compared with, kept in files because it is slow."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+
+import nubis
+from benchmarks.metrics import Layers
+
+ROOT = Path(__file__).parents[1]
+CACHE = ROOT / "out" / "benchmarks"
+
+Size = tuple[int, int]
+
+
+def reference_layers(scene: str, size: Size) -> Layers:
+    """The layers of a scene without any error that matters: rendered once, then read again."""
+    renderer = _renderer(size)
+    path = CACHE / f"{scene}-{size[0]}x{size[1]}-{_key(scene, renderer)}.npz"
+    if path.exists():
+        with np.load(path) as file:
+            return dict(file)
+    layers = renderer.render_layers(*nubis.scenes[scene])
+    path.parent.mkdir(parents=True, exist_ok=True)
+    unfinished = path.with_suffix(f".{os.getpid()}.npz")
+    np.savez(unfinished, **layers)
+    unfinished.replace(path)
+    return layers
+
+
+def about(size: Size) -> dict[str, object]:
+    """How the reference is computed, for the results."""
+    return {"quality": _renderer(size).quality.to_dict()}
+
+
+def shader_hash() -> str:
+    """Of all shader files, by name and content."""
+    folder = Path(os.environ.get("NUBIS_SHADERS") or ROOT / "shaders" / "wgsl")
+    digest = hashlib.sha256()
+    for file in sorted(folder.rglob("*.wgsl")):
+        digest.update(file.relative_to(folder).as_posix().encode() + b"\0" + file.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _key(scene: str, renderer: nubis.Renderer) -> str:
+    camera, params = nubis.scenes[scene]
+    view = [camera.kind, camera.eye, camera.forward, camera.up, camera.fov]
+    key = [
+        [view, params.to_dict(), renderer.size, renderer.quality.to_dict()],
+        [nubis.__version__, shader_hash(), renderer.adapter],
+    ]
+    return hashlib.sha256(json.dumps(key).encode()).hexdigest()[:16]
+
+
+@functools.cache
+def _renderer(size: Size) -> nubis.Renderer:
+    return nubis.Renderer(*size, quality="reference")

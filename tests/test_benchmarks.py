@@ -1,0 +1,237 @@
+"""The benchmarks: their metrics against numbers worked out by hand, and a quick run of all."""
+
+import csv
+import json
+import math
+from importlib.util import find_spec
+
+import numpy as np
+import pytest
+
+import nubis
+from benchmarks import __main__ as command
+from benchmarks import measure, methods, metrics, page, plots, reference, shapes, soak
+
+
+def layers(radiance, transmittance, sky=0.0):
+    """Of a picture one pixel high, grey."""
+    radiance = np.float32([radiance])
+    return {
+        "radiance": np.stack([radiance] * 3, axis=-1),
+        "transmittance": np.float32([transmittance]),
+        "sky": np.full((*radiance.shape, 3), sky, np.float32),
+    }
+
+
+def test_errors():
+    """Two pixels of cloud, one of clear sky, whose error counts in the percentile alone."""
+    truth = layers([1.0, 3.0, 0.0], [0.5, 0.0, 1.0])
+    test = layers([1.5, 2.0, 4.0], [0.75, 0.0, 1.0])
+    found = metrics.errors(test, truth)
+    # Differences 0.5 and -1, mean radiance 2.
+    assert found["rel_rmse"] == pytest.approx(math.sqrt((0.25 + 1) / 2) / 2)
+    assert found["bias"] == pytest.approx(-0.25 / 2)
+    # Linear between the sorted errors 0.5, 1, 4, at 0.999 of the way.
+    assert found["p999"] == pytest.approx(1 + 0.998 * 3)
+    assert found["t_rmse"] == pytest.approx(0.25 / math.sqrt(3))
+    assert found["t_max"] == pytest.approx(0.25)
+
+
+def test_which_pixels_are_cloud():
+    """Optical depth 0.0011 is, 0.0009 is not."""
+    truth = layers([1.0, 1.0], np.exp([-0.0011, -0.0009]))
+    found = metrics.errors(layers([2.0, 5.0], truth["transmittance"][0]), truth)
+    assert found["rel_rmse"] == pytest.approx(1)
+    assert found["bias"] == pytest.approx(1)
+
+
+def test_composed():
+    pixel = metrics.composed(layers([0.25], [0.5]), layers([0], [1], sky=3.0)["sky"])
+    assert pixel.tolist() == [[[1.75] * 3]]
+
+
+@pytest.mark.skipif(not find_spec("flip_evaluator"), reason="the extra `bench` is not installed")
+def test_flip():
+    grey = np.full((16, 16, 3), 0.5, np.float32)
+    assert metrics.flip(grey, grey) == 0
+    assert 0.1 < metrics.flip(2 * grey, grey) < 1
+
+
+def test_enlarge():
+    """A ramp stays a ramp between the outer pixel centres, and is held beyond them."""
+    ramp = np.array([[0.0, 2.0, 4.0]])
+    assert metrics.enlarge(ramp, 2)[0] == pytest.approx([0, 0.5, 1.5, 2.5, 3.5, 4])
+    assert metrics.enlarge(ramp, 2).shape == (2, 6)
+    assert metrics.enlarge(ramp.T, 2)[:, 1] == pytest.approx([0, 0.5, 1.5, 2.5, 3.5, 4])
+    assert metrics.enlarge(ramp[..., None] * [1, 10], 3)[0, 4] == pytest.approx([2, 20])
+
+
+def test_line_fit():
+    """By hand: through (0, 1), (1, 2), (2, 6) goes y = 0.5 + 2.5 x; residuals 0.5, -1, 0.5."""
+    line = shapes.fit([0, 1, 2], [1, 2, 6])
+    assert line["slope"] == pytest.approx(2.5)
+    assert line["intercept"] == pytest.approx(0.5)
+    assert line["r2"] == pytest.approx(1 - 1.5 / 14)
+
+
+def test_evaluations_in_step():
+    """Nine pixels a row make two groups; each pays eight times its largest."""
+    samples = np.array([[1, 2, 3, 4, 5, 6, 7, 8, 10], [0] * 9])
+    assert shapes.in_step(samples) == pytest.approx(8 * (8 + 10) / 18)
+
+
+def test_pareto_front():
+    points = [(1, 5), (2, 6), (3, 2), (3, 1), (4, 1), (5, 0.5)]
+    rows = [{"seconds": x, "rel_rmse": y} for x, y in points]
+    assert [(r["seconds"], r["rel_rmse"]) for r in plots.pareto(rows)] == [(1, 5), (3, 1), (5, 0.5)]
+
+
+def test_methods():
+    """Names are unique, the last of a family is its finest, and every quality is allowed."""
+    for chosen in methods.full(), methods.quick():
+        assert len({m.name for m in chosen}) == len(chosen)
+        for family in {m.family for m in chosen} - set(methods.PRESETS):
+            values = [m.value for m in chosen if m.family == family]
+            assert values == sorted(values, reverse="resolution" in family) and len(values) > 1
+        for method in chosen:
+            nubis.Renderer(1, 1, quality=method.quality)
+
+
+def test_page_blocks():
+    text = "a\n<!-- begin x -->\nold\n<!-- end x -->\nb"
+    new = page.fill(text, "x", r"\1 new")
+    assert new == "a\n<!-- begin x -->\n\\1 new\n<!-- end x -->\nb"
+    with pytest.raises(ValueError, match="markers"):
+        page.fill(text, "y", "")
+
+
+@pytest.fixture(scope="module")
+def quick(tmp_path_factory):
+    """The folder of a quick run with its own references."""
+    out = tmp_path_factory.mktemp("results")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(reference, "CACHE", out / "references")
+        command.main(["--quick", "--out", str(out)])
+        stored = sorted((out / "references").iterdir())
+        assert len(stored) == 2
+        first = reference.reference_layers("fair_weather", (64, 36))
+        assert sorted((out / "references").iterdir()) == stored
+        assert first["radiance"].shape == (36, 64, 3)
+    return out
+
+
+def test_quick_run(quick):
+    results = json.loads((quick / "results.json").read_text())
+    head, rows = results["header"], results["rows"]
+    assert head["version"] == nubis.__version__
+    assert head["adapter"]["name"] == nubis.Renderer(1, 1).adapter.name
+    assert set(head) >= {"date", "cpu", "cores", "command", "reference", "shaders"}
+    assert set(head["seeds"]) == {row["scene"] for row in rows}
+    wanted = {(s, m.name) for s in head["seeds"] for m in methods.quick()}
+    assert {(row["scene"], row["method"]) for row in rows} == wanted and len(rows) == len(wanted)
+    for row in rows:
+        numbers = [v for k, v in row.items() if k != "flip" and isinstance(v, int | float)]
+        assert np.isfinite(numbers).all()
+        assert 0 < row["seconds"] <= row["seconds_p95"]
+        assert row["evaluations"] > 0 and 0 < row["rel_rmse"] < 2 and 0 <= row["t_max"] <= 1
+        assert (row["flip"] is not None) == bool(find_spec("flip_evaluator"))
+    for scene in head["seeds"]:
+        found = {row["method"]: row for row in rows if row["scene"] == scene}
+        assert found["balanced"]["rel_rmse"] < found["draft"]["rel_rmse"]
+        few, many = (found[f"draft: view steps {n}"] for n in (24, 96))
+        assert few["evaluations"] < many["evaluations"] and few["rel_rmse"] > many["rel_rmse"]
+        # Counted on pixels of the whole picture.
+        small = found["draft: resolution 1/4"]["evaluations"]
+        assert small == pytest.approx(found["draft"]["evaluations"] / 16, rel=0.25)
+
+
+def test_quick_table(quick):
+    """The table holds what the JSON holds."""
+    rows = json.loads((quick / "results.json").read_text())["rows"]
+    with open(quick / "results.csv", newline="") as file:
+        table = list(csv.DictReader(file))
+    assert len(table) == len(rows)
+    for line, row in zip(table, rows, strict=True):
+        assert line == {k: "" if v is None else str(v) for k, v in row.items()}
+
+
+def test_quick_shapes(quick):
+    found = json.loads((quick / "shapes.json").read_text())
+    (sweep,) = found["sweeps"]
+    evaluations = [row["evaluations"] for row in sweep["rows"]]
+    steps = [row["value"] for row in sweep["rows"]]
+    # View and light samples both grow with the view steps, whatever the clock says.
+    assert shapes.fit(steps, evaluations)["r2"] > 0.99
+    assert all(r["evaluations"] <= r["evaluations_in_step"] for r in sweep["rows"])
+
+
+@pytest.mark.skipif(not find_spec("matplotlib"), reason="the extra `bench` is not installed")
+def test_quick_plots(quick):
+    names = {path.stem for path in (quick / "plots").iterdir()}
+    scenes = ["fair_weather", "above", "summary"]
+    axes = ["seconds", "evaluations"]
+    assert names == {f"{s}-{a}" for s in scenes for a in axes} | {"shapes"}
+    assert all(path.stat().st_size < 150 * 1024 for path in (quick / "plots").iterdir())
+
+
+def test_quick_page(quick, tmp_path):
+    """All blocks are filled; what was not measured is left."""
+    copy = tmp_path / "accuracy.md"
+    copy.write_text(page.PAGE.read_text())
+    page.write(quick, copy)
+    text = copy.read_text()
+    for row in json.loads((quick / "results.json").read_text())["rows"]:
+        if plots.is_preset(row):
+            assert (
+                f"{page._percent(row['rel_rmse'])} ({page._number(1000 * row['seconds'])} ms)"
+                in text
+            )
+    assert "stand-in" in text or reference._exists()
+    soak_before, soak_after = (t.split("begin soak")[1] for t in (page.PAGE.read_text(), text))
+    assert soak_before == soak_after
+
+
+def test_geometric_mean():
+    rows = [
+        {"method": "a", "family": "a", "scene": s, "bias": b, "t_max": t, "flip": None}
+        | {"setup_seconds": v}
+        | {n: v for n in ("seconds", "seconds_p95", "evaluations", "rel_rmse", "p999", "t_rmse")}
+        for s, b, t, v in [("x", 0.5, 0.1, 2.0), ("y", -0.1, 0.3, 8.0)]
+    ]
+    (mean,) = plots.geometric_mean(rows)
+    assert mean["seconds"] == mean["rel_rmse"] == pytest.approx(4)
+    assert mean["setup_seconds"] == pytest.approx(5)
+    assert mean["bias"] == pytest.approx(0.2) and mean["t_max"] == 0.3 and mean["flip"] is None
+
+
+def test_soak(tmp_path, monkeypatch):
+    """Two short shots."""
+    monkeypatch.setattr(soak, "SHOT", 6)
+    monkeypatch.setattr(soak, "READING", 2)
+    path = tmp_path / "soak.json"
+    assert soak.main(["--frames", "12", "--out", str(path)]) == 0
+    found = json.loads(path.read_text())
+    assert found["faults"] == [] and found["cuts"] == 1 and found["stills_compared"] == 2
+    assert found["header"]["version"] == measure.nubis.__version__
+
+
+def test_soak_sees_faults():
+    good = {
+        "broken_frames": 0,
+        "lowest": 0.0,
+        "stills_that_differ": 0,
+        "still_equals_new_process": True,
+        "static_shot_equals_still": True,
+        "held_rel_rmse": 0.01,
+    }
+    assert soak.faults(good) == []
+    bad = {
+        "broken_frames": 1,
+        "lowest": -1e-6,
+        "stills_that_differ": 1,
+        "still_equals_new_process": False,
+        "static_shot_equals_still": False,
+        "held_rel_rmse": float("nan"),
+    }
+    for name, value in bad.items():
+        assert len(soak.faults(good | {name: value})) == 1

@@ -18,7 +18,7 @@ Each case becomes NAME.json, its settings with what is known of its error, and N
     mitsuba_*   tiles, tiles_error: means of tiles of 8 x 8 pixels and their standard errors
 
 Radiance is for an irradiance of 1. disort.json has its numbers in itself. On two cores `exact`
-takes a minute and a half, `mitsuba` eleven, `disort` seconds.
+takes two minutes, `mitsuba` half an hour on a busy machine, `disort` seconds.
 """
 
 import argparse

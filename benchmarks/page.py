@@ -64,12 +64,10 @@ def _about(header: Row) -> str:
 
 
 def _reference(header: Row) -> str:
-    if not header["reference"]["stand_in"]:
-        return ' The reference is `quality="reference"`.'
-    quality = header["reference"]["quality"]
+    tolerance = header["reference"]["quality"]["tolerance"]
     return (
-        f" **The reference is a stand-in**: `high` with {quality['steps_horizon']} view steps and "
-        f"{quality['light_steps']} light steps; errors near its own are not to be trusted."
+        ' The reference is `quality="reference"`: steps halved until no pixel changes by more than '
+        f"{tolerance:.1%}."
     )
 
 

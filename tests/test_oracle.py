@@ -99,8 +99,9 @@ def test_stored_pictures_against_a_plain_marcher(name):
 # with an optical depth of 1e-3 and more.
 BOUNDS = {
     "reference": (1e-4, 1e-3, 3e-4),
-    "high": (0.2, 0.2, 0.1),
-    "balanced": (0.5, 0.5, 0.2),
+    # Measured: at most 0.002, 0.9 % and 0.25 %, and 0.028, 27 % (backward into a low sun) and 2.3 %.
+    "high": (3e-3, 0.012, 4e-3),
+    "balanced": (0.04, 0.35, 0.04),
 }
 
 
@@ -124,21 +125,22 @@ def test_single_scattering(renderer, quality, name):
 
 @pytest.mark.parametrize("name", ["blob_beside", "cumulus_inside", "rough_inside"])
 def test_order_of_convergence(renderer, name):
-    """Equal steps, twice as many each time, against what was stored: the error falls with the
-    square of the step. From inside, as where a ray begins and ends in nothing even samples at the
-    start of steps are of second order.
+    """Equal steps, twice as many each time: the error falls with the square of the step, down to
+    what the half floats of a filtered grid leave. From inside, as where a ray begins and ends in
+    nothing even samples at the start of steps are of second order.
     """
     case, want = stored(f"exact_{name}")
-    steps = np.array([24, 48, 96, 192])
     camera, params = scene(case)
-    error = []
-    for n in steps:
-        make = renderer(case["width"], case["height"], twin.fine(int(n)))
-        clear = make.render_layers(camera, params)["transmittance"]
-        error.append(np.sqrt(np.mean((clear - want["transmittance"]) ** 2)))
+
+    def clear(n):
+        make = renderer(case["width"], case["height"], twin.fine(n))
+        return make.render_layers(camera, params)["transmittance"]
+
+    steps, limit = [16, 32, 64, 128], clear(2048)
+    error = [np.sqrt(np.mean((clear(n) - limit) ** 2)) for n in steps]
     order = -np.polyfit(np.log(steps), np.log(error), 1)[0]
     assert order >= 1.7
-    assert error[-1] < 1e-4
+    assert np.sqrt(np.mean((limit - want["transmittance"]) ** 2)) < 5e-5
 
 
 @pytest.mark.parametrize("name", grids.ALL)
@@ -154,7 +156,10 @@ def test_density_and_sun(renderer, rng, name):
     points = low + u * (high - low)
     got = renderer().density(points, params)
     want = grids.lookup(extinction.astype(np.float64), bounds, points)
-    np.testing.assert_allclose(got, want, atol=1e-4 * extinction.max())
+    # Half floats, filtered; and f32.
+    np.testing.assert_allclose(got, want, rtol=5e-4, atol=1e-6 * extinction.max())
+    got = renderer(8, 8, "reference").density(points, params)
+    np.testing.assert_allclose(got, want, rtol=1e-5, atol=4e-6 * extinction.max())
     some = points[:120]
     got = renderer(8, 8, "reference").sun_transmittance(some, params)
     sun = np.broadcast_to(twin.sun_direction(params), some.shape)

@@ -20,6 +20,9 @@ const DONE = 4u;
 // The shortest step, m: less than a thousandth of what light goes freely in the densest cloud, and more than positions are
 // rounded by, so that a flight ends whatever the extinction.
 const SHORTEST = 1e-3;
+// A path of so many turns ends where it is. None does where light can go a metre; where it cannot (extinction up to
+// 1e8 / m) or where clouds are a metre thick, paths must end too.
+const MOST_TURNS = 1u << 22u;
 // Below it a path goes on by chance alone, with the weight of those that end (Russian roulette).
 const FAINT = 0.1;
 
@@ -75,7 +78,9 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
         let real = select(0.0, saturate(density / max(majorant.density, 1e-30)), collides);
         let ends = ray.x >= length;
 
-        if ray.stage == FLIGHT {
+        if ray.draws > MOST_TURNS {
+            ray = path_ended(ray);
+        } else if ray.stage == FLIGHT {
             if real > u.y {
                 ray.scatterings += 1u;
                 ray.throughput *= params.light.albedo;

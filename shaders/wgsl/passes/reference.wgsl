@@ -23,8 +23,13 @@ const UNEVEN = 0.5;
 const SHORTEST = 1e-3;
 // Where a ray ends: behind it even light of full strength does not matter.
 const OPAQUE = 18.0;
-// After so many halvings a ray counts as converged; `uncertainty` tells.
+// A ray is cut into no more panels than that before any halving, whatever the size of its features: long rays through
+// small ones still end.
+const VIEW_PANELS = 4096.0;
+const SUN_PANELS = 1024.0;
+// After so many halvings, or evaluations, a ray counts as converged; `uncertainty` tells.
 const MOST_HALVINGS = 5u;
+const MOST_EVALUATIONS = 1u << 24u;
 // Radiance, as a share of the sun's irradiance, below which errors do not matter.
 const DARK = 1e-6;
 
@@ -77,7 +82,8 @@ fn reference(@builtin(global_invocation_id) id: vec3u) {
         }
         let x = select(ray.x, ray.sun_x, toward_sun);
         let left = select(length, s.first + s.second, toward_sun) - x;
-        var longest = finer * clamp(width, 2.0 * finest_feature(), coarsest_panel());
+        let fair = (x + left) / select(VIEW_PANELS, SUN_PANELS, toward_sun);
+        var longest = finer * max(clamp(width, 2.0 * finest_feature(), coarsest_panel()), fair);
         if VOLUME {
             // Cells end the panels toward the sun; those of the view are halved, as their light is no cubic.
             longest = select(finer * frame.voxel, 1e30, toward_sun);
@@ -178,7 +184,7 @@ fn finished(given: ReferenceRay, index: u32, empty: bool) -> ReferenceRay {
     let change = abs(result - ray.previous);
     let dark = DARK * sky_light[2].rgb;
     let steady = all(change.rgb <= quality.tolerance * (result.rgb + dark)) && change.a <= 0.1 * quality.tolerance;
-    if empty || (ray.level > 0u && steady) || ray.level >= MOST_HALVINGS {
+    if empty || (ray.level > 0u && steady) || ray.level >= MOST_HALVINGS || (ray.level > 0u && evaluations > MOST_EVALUATIONS) {
         clouds[index] = select(result, vec4f(0.0, 0.0, 0.0, 1.0), empty);
         cloud_depth[index] = select(-1.0, sum.distance / sum.weight, !empty && sum.weight > 0.0);
         samples[index] = evaluations;

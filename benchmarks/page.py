@@ -359,6 +359,7 @@ def _soak(soak: Row) -> str:
     half = memory[len(memory) // 2]
     equal = "equals" if soak["still_equals_new_process"] else "**differs from**"
     static = "equals" if soak["static_shot_equals_still"] else "**differs from**"
+    held = "becomes the still" if soak["held_equals_still"] else "comes near the still"
     growth = soak["memory_growth_mib_per_1000_frames"]
     return (
         _about(soak["header"])
@@ -368,7 +369,7 @@ def _soak(soak: Row) -> str:
         f"{soak['stills_compared']} stills after cuts {soak['stills_that_differ']} differ from "
         f"those of a new renderer. The last still {equal} that of a new process byte for byte; a "
         f"static shot {static} the still byte for byte. The last frame, held for "
-        f"{soak['held_frames']} frames, is {_percent(soak['held_rel_rmse'])} (relative RMSE) "
-        f"from the still. Memory: {half[1]:.0f} MiB at frame {half[0]}, "
+        f"{soak['held_frames']} frames, {held} (relative RMSE "
+        f"{_percent(soak['held_rel_rmse'])}). Memory: {half[1]:.0f} MiB at frame {half[0]}, "
         f"{memory[-1][1]:.0f} MiB at the end, {growth:+.2f} MiB a 1000 frames over the second half."
     )

@@ -101,8 +101,9 @@ def test_page_blocks():
     text = "a\n<!-- begin x -->\nold\n<!-- end x -->\nb"
     new = page.fill(text, "x", r"\1 new")
     assert new == "a\n<!-- begin x -->\n\\1 new\n<!-- end x -->\nb"
-    with pytest.raises(ValueError, match="markers"):
-        page.fill(text, "y", "")
+    for broken in text.replace("begin", "no"), text.replace("end", "no"), text + text:
+        with pytest.raises(ValueError, match="markers"):
+            page.fill(broken, "x", "")
 
 
 @pytest.fixture(scope="module")

@@ -183,8 +183,7 @@ def _sweep(sweep: Sweep, run: Callable[..., Row]) -> Row:
         "knob": sweep.knob,
         "rows": rows,
         "fit": fit(sweep.values, seconds),
-        "fit_by_evaluations": fit([row["evaluations"] for row in rows], seconds),
-        "fit_by_evaluations_in_step": fit([row["evaluations_in_step"] for row in rows], seconds),
+        "fit_of_processor": fit(sweep.values, [row["processor_seconds"] for row in rows]),
         "published_ms": list(published.items()),
         "published_fit": fit(list(published), list(published.values())) if published else None,
     }

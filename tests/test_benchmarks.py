@@ -101,8 +101,9 @@ def test_page_blocks():
     text = "a\n<!-- begin x -->\nold\n<!-- end x -->\nb"
     new = page.fill(text, "x", r"\1 new")
     assert new == "a\n<!-- begin x -->\n\\1 new\n<!-- end x -->\nb"
-    with pytest.raises(ValueError, match="markers"):
-        page.fill(text, "y", "")
+    for broken in text.replace("begin", "no"), text.replace("end", "no"), text + text:
+        with pytest.raises(ValueError, match="markers"):
+            page.fill(broken, "x", "")
 
 
 @pytest.fixture(scope="module")
@@ -112,12 +113,21 @@ def quick(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(reference, "CACHE", out / "references")
         command.main(["--quick", "--out", str(out)])
-        stored = sorted((out / "references").iterdir())
-        assert len(stored) == 2
-        first = reference.reference_layers("fair_weather", (64, 36))
-        assert sorted((out / "references").iterdir()) == stored
-        assert first["radiance"].shape == (36, 64, 3)
     return out
+
+
+def test_references_are_stored(tmp_path, monkeypatch):
+    """And read again, until a shader changes."""
+    monkeypatch.setattr(reference, "CACHE", tmp_path)
+    first = reference.reference_layers("fair_weather", (16, 9))
+    assert first["radiance"].shape == (9, 16, 3)
+    (stored,) = tmp_path.iterdir()
+    np.savez(stored, radiance=first["radiance"] + 1)
+    again = reference.reference_layers("fair_weather", (16, 9))
+    assert (again["radiance"] == first["radiance"] + 1).all()
+    monkeypatch.setattr(reference, "shader_hash", lambda: "changed")
+    anew = reference.reference_layers("fair_weather", (16, 9))
+    assert (anew["radiance"] == first["radiance"]).all() and len(list(tmp_path.iterdir())) == 2
 
 
 def test_quick_run(quick):

@@ -123,7 +123,7 @@ def shells(sky):
 
 
 @st.composite
-def eyes(draw, sky, arcs=(0.0, 0.0, 1.0, 1e4, 3e5, 1e7)):
+def eyes(draw, sky, arcs=(0.0, 0.0, 1.0, 1e4, 3e5, 1e7), highest=1e8):
     """From 100 m under the ground to 100 000 km, often a centimetre from a shell."""
     shell = st.sampled_from(shells(sky))
     altitude = draw(
@@ -133,6 +133,7 @@ def eyes(draw, sky, arcs=(0.0, 0.0, 1.0, 1e4, 3e5, 1e7)):
             st.sampled_from([-100.0, -0.01, 0.0, 2.0, 200.0, 4e5, 3.6e7, 1e8]),
         )
     )
+    altitude = min(altitude, highest)
     radius = sky.atmosphere.planet_radius
     angle = draw(st.sampled_from(arcs)) / radius
     heading = twin.compass(draw(st.sampled_from([0.0, 45.0, 200.0])))

@@ -102,7 +102,9 @@ def params(draw, fields=tuple(FIELDS), **fixed):
     """A few parameters away from their defaults, or all of them."""
     few = st.lists(st.sampled_from(fields), unique=True, max_size=10)
     changed = draw(st.one_of(few, few, st.just(list(fields))))
-    values = {f"{g}.{n}": draw(field(g, n)) for g, n in changed} | fixed
+    # A small texture of high clouds, where none is drawn: it is baked for most skies anew.
+    values = {"high_clouds.texture_size": 64}
+    values |= {f"{g}.{n}": draw(field(g, n)) for g, n in changed} | fixed
     base, top = (values.get(f"clouds.{n}", getattr(Params().clouds, n)) for n in ("base", "top"))
     if np.float32(top) <= np.float32(base):
         # The thinnest shell that f32 knows, or one of a metre.
@@ -121,17 +123,17 @@ def shells(sky):
 
 
 @st.composite
-def eyes(draw, sky, arcs=(0.0, 0.0, 1.0, 1e4, 3e5, 1e7)):
-    """From the middle of the planet to 100 000 km, often a centimetre from a shell."""
+def eyes(draw, sky, arcs=(0.0, 0.0, 1.0, 1e4, 3e5, 1e7), highest=1e8):
+    """From 100 m under the ground to 100 000 km, often a centimetre from a shell."""
     shell = st.sampled_from(shells(sky))
     altitude = draw(
         st.one_of(
             st.builds(sum, st.tuples(shell, st.sampled_from([-0.01, 0.0, 0.01]))),
             st.floats(0, 8).map(lambda e: 10**e),
             st.sampled_from([-100.0, -0.01, 0.0, 2.0, 200.0, 4e5, 3.6e7, 1e8]),
-            st.just(-sky.atmosphere.planet_radius),
         )
     )
+    altitude = min(altitude, highest)
     radius = sky.atmosphere.planet_radius
     angle = draw(st.sampled_from(arcs)) / radius
     heading = twin.compass(draw(st.sampled_from([0.0, 45.0, 200.0])))
@@ -173,9 +175,16 @@ def look(eye, direction, fov=60.0, up=None):
     return Camera.look_at(eye, np.array(eye) + 1e6 * np.array(direction), up, fov)
 
 
+def middle_is_in_reach(sky):
+    """Whether an eye may be in the middle of the planet, where no direction is up."""
+    return sky.atmosphere.planet_radius <= FARTHEST
+
+
 @st.composite
 def cameras(draw, sky):
-    eye = draw(eyes(sky))
+    middle = st.just((0.0, 0.0, -sky.atmosphere.planet_radius))
+    near = eyes(sky)
+    eye = draw(st.one_of(near, near, near, middle) if middle_is_in_reach(sky) else near)
     projection = draw(st.sampled_from(["perspective", "perspective", "equirect", "fisheye"]))
     if projection == "equirect":
         return Camera.equirect(eye)

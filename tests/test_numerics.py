@@ -19,6 +19,14 @@ def test_share_of_a_step():
     assert probe("one_minus_exp_over(x.x)", [0.0], imports=["math"])[0, 0] == 1
 
 
+def test_transmittance_of_next_to_nothing():
+    """On lavapipe the exponential of -1e-9 is 6e-8 less than 1."""
+    x = f32(np.concatenate([[0], np.logspace(-12, 2, 300), np.linspace(0.09, 0.11, 50)]))
+    got = probe("transmittance_of(x.x)", x, imports=["math"])[:, 0]
+    np.testing.assert_allclose(got, np.exp(-x), atol=1.2e-7)
+    assert (got[x < 1e-8] == 1).all() and got.min() >= 0
+
+
 def test_remap_is_clamped_and_finite():
     v, a, b = np.meshgrid([-1, 0, 0.25, 0.5, 0.7, 1, 2], [0, 0.25, 0.5, 1], [0, 0.3, 0.5, 1])
     inputs = np.stack([v.ravel(), a.ravel(), b.ravel()], axis=1)

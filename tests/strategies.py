@@ -3,6 +3,7 @@ parameters: every range and every word comes from the generated classes.
 """
 
 import dataclasses
+import functools
 import math
 import re
 import typing
@@ -53,6 +54,8 @@ def weather_maps(draw):
     return np.array(steps, dtype=np.float32).reshape(*size, 3)
 
 
+# Made once: making strategies takes longer than rendering their examples.
+@functools.cache
 def field(group, name):
     """All values of a parameter."""
     hint = kind(group, name)
@@ -215,6 +218,10 @@ SLOW = [name for name in ("reference", "vsu2022", "high") if name in NAMES]
 FEW = {"steps_zenith": 32, "steps_horizon": 64, "light_steps": 6}
 
 
+# Paths are dear: two, and not for long.
+DRAFT = nubis.quality("draft").replace(path_samples=2, path_scatterings=64)
+
+
 @st.composite
 def qualities(draw):
     """A named method, or any with few samples."""
@@ -229,10 +236,10 @@ def qualities(draw):
                 values[f.name] = draw(st.integers(low, FEW.get(f.name, low + 1)))
             else:
                 values[f.name] = draw(field("quality", f.name))
-        method, slow = Quality(**values), False
-    # Paths are dear: one or two.
-    paths = {f.name: 1 for f in dataclasses.fields(Quality) if "path" in f.name}
-    return method.replace(**paths), slow
+        values["tolerance"] = draw(st.sampled_from([0.0, 0.0, 1e-3, 0.1, 1.0]))
+        method, slow = Quality(**values), values["tolerance"] > 0
+    scatterings = draw(st.sampled_from([1, 2, 64, 4096]))
+    return method.replace(path_samples=2, path_scatterings=scatterings), slow
 
 
 @st.composite
@@ -242,6 +249,6 @@ def pictures(draw):
     sizes = [(1, 1), (2, 3), (4, 4)]
     if not slow:
         sizes += [(8, 6), (5, 7), (13, 3), (1, 33), (8, 6), (5, 7), (13, 3)]
-    if method == nubis.quality("draft"):
+    if method.replace(path_scatterings=64) == DRAFT:
         sizes += [(1, 4096), (4096, 1)]
     return draw(st.sampled_from(sizes)), method

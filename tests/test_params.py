@@ -4,6 +4,7 @@ files.
 
 import copy
 import dataclasses
+import functools
 import math
 import pickle
 import re
@@ -28,6 +29,7 @@ FIELDS = [
 NAN, INF = float("nan"), float("inf")
 
 
+@functools.cache
 def allowed(group, name):
     """What the documentation of a field says is allowed: its words, and the range that they name
     if they do.
@@ -44,6 +46,7 @@ def each(fields):
     return pytest.mark.parametrize(("group", "name"), fields, ids=[".".join(f) for f in fields])
 
 
+@functools.cache
 def kind(group, name):
     return typing.get_type_hints(CLASSES[group])[name]
 

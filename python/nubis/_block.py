@@ -77,7 +77,8 @@ class Root(Base):
             value = getattr(self, field.name)
             wanted = field.default_factory
             if field.default is None:  # A group that may be missing: the volume.
-                fits, allowed = value is None or isinstance(value, DensityGrid), "DensityGrid or None"
+                fits = value is None or isinstance(value, DensityGrid)
+                allowed = "DensityGrid or None"
             else:
                 fits = isinstance(wanted, type) and isinstance(value, wanted)
                 allowed = getattr(wanted, "__name__", "?")

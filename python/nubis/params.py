@@ -225,7 +225,9 @@ class Light(Block):
     octaves : int
         Orders of scattering that `octaves` sums up. Allowed: a whole number from 1 to 16.
     octave_scattering : float
-        Share of the light that each octave keeps of the one before. Allowed: a number from 0 to 1.
+        Share of the light that each octave keeps of the one before. This and the next two are
+        fitted to `path` for three octaves (docs/accuracy.md); 0.5 is usual. Allowed: a number from
+        0 to 1.
     octave_extinction : float
         Share of the extinction toward the sun that each octave keeps of the one before. Allowed: a
         number from 0 to 1.
@@ -262,9 +264,9 @@ class Light(Block):
     lobe_mix: float = 0.5
     albedo: float = 0.999
     octaves: int = 3
-    octave_scattering: float = 0.5
-    octave_extinction: float = 0.5
-    octave_phase: float = 0.5
+    octave_scattering: float = 0.91
+    octave_extinction: float = 0.26
+    octave_phase: float = 0.25
     sun_gain: float = 2.2
     absorption: float = 0.22
     ambient: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -349,7 +351,7 @@ class Quality(Block):
         go to the end of the clouds; 0 marches with the settings above. Allowed: a number from 0 to
         1.
     path_samples : int
-        Paths traced for each pixel (light model `path`). Allowed: a whole number from 1 to 1048576.
+        Paths traced for each pixel (light model `path`). Allowed: a whole number from 2 to 1048576.
     path_scatterings : int
         Most scatterings of a path (light model `path`); 1 is single scattering. Allowed: a whole
         number from 1 to 1048576.

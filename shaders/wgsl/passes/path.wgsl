@@ -17,12 +17,12 @@ const SHADOW = 2u; // toward the sun, from a collision
 const GROUND = 3u; // toward the sun, from the ground
 const DONE = 4u;
 
-// The shortest step, m: less than a thousandth of what light goes freely in the densest cloud, and more than positions are
-// rounded by, so that a flight ends whatever the extinction.
-const SHORTEST = 1e-3;
+// The shortest step, m: more than positions are rounded by, so that a flight ends whatever the extinction. In the densest
+// cloud light goes several metres freely; of an extinction of 1 / m it makes 5e-5 less.
+const SHORTEST = 1e-2;
 // A path of so many turns ends where it is. None does where light can go a metre; where it cannot (extinction up to
 // 1e8 / m) or where clouds are a metre thick, paths must end too.
-const MOST_TURNS = 1u << 22u;
+const MOST_TURNS = 1u << 20u;
 // Below it a path goes on by chance alone, with the weight of those that end (Russian roulette).
 const FAINT = 0.1;
 

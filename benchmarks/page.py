@@ -32,6 +32,10 @@ def write(folder: Path, page: Path = PAGE) -> None:
     if (shapes := _read(folder, "shapes.json")) is not None:
         blocks["about the shapes"] = _about(shapes["header"])
         blocks["shapes"] = _shapes(shapes) + "\n\n" + _image(folder, page, "shapes")
+    if (octaves := _read(folder, "octaves.json")) is not None:
+        blocks["octaves"] = _octaves(octaves)
+    if (oracle := _read(folder, "oracle.json")) is not None:
+        blocks["oracle"] = _oracle(oracle)
     if (soak := _read(folder, "soak.json")) is not None:
         blocks["soak"] = _soak(soak) + "\n\n" + _image(folder, page, "soak")
     for name, block in blocks.items():
@@ -55,12 +59,12 @@ def _read(folder: Path, name: str) -> Row | None:
 
 def _about(header: Row) -> str:
     adapter = header["adapter"]
-    width, height = header["size"]
     renders = f", median of {header['repeats']} renders" if "repeats" in header else ""
+    size = "{}×{}{}".format(*header["size"], renders) if "size" in header else "the cases' sizes"
     return (
         f"Measured {header['date']} on {adapter['name']} ({adapter['kind']}, {adapter['driver']}), "
         f"{header['cpu']}, {header['cores']} cores; nubis {header['version']}, shaders "
-        f"{header['shaders']}, {width}×{height}{renders}; `{header['command']}`."
+        f"{header['shaders']}, {size}; `{header['command']}`."
     )
 
 
@@ -380,6 +384,59 @@ def _switches(rows: list[Row]) -> str:
     ]
     return "What the optimisations of thesis2018 save (its figure 39):\n\n" + _table(
         ["with", "evaluations a pixel", "ms"], lines
+    )
+
+
+def _octaves(octaves: Row) -> str:
+    """What is left of the error of the light model "octaves"."""
+
+    def line(row: Row) -> list[str]:
+        constants = ", ".join(f"{v:.2f}" for v in row["constants"])
+        return [
+            f"{row['what']}, {row['octaves']}" if row["octaves"] > 1 else row["what"],
+            constants if row["octaves"] > 1 else "–",
+            _percent(row["rel_rmse"]),
+            _percent(row["worst_rel_rmse"]),
+            _percent(row["rms_relative"]),
+            _percent(row["bias"], "+"),
+            _percent(row["bias_rms"]),
+        ]
+
+    head = ["", "a, b, c", "rel. RMSE", "worst case", "rms relative", "bias", "rms bias"]
+    return (
+        _about(octaves["header"])
+        + f" {len(octaves['cases'])} cases, {octaves['header']['samples']} paths a pixel; a tile's "
+        f"standard error is {_percent(octaves['noise'])} in the mean.\n\n"
+        + _table(head, map(line, octaves["rows"]))
+    )
+
+
+def _oracle(oracle: Row) -> str:
+    """How far the qualities are from other programs."""
+    qualities = [key for key in oracle["exact"][0] if key != "case"]
+
+    def line(row: Row) -> list[str]:
+        cells = [row["case"]]
+        for q in qualities:
+            e = row[q]
+            cells.append(f"{e['rel_rmse']:.2g}, {e['bias']:+.1g}, {e['t_max']:.1g}")
+        return cells
+
+    paths = [
+        [
+            row["case"],
+            f"{row['ratio']:.4f} ± {row['ratio_error']:.4f}",
+            f"{row['z_std']:.2f}",
+            f"{row['z_max']:.2f}",
+        ]
+        for row in oracle["mitsuba"]
+    ]
+    return (
+        _about(oracle["header"])
+        + "\n\nRelative RMSE, bias and largest error of the transmittance:\n\n"
+        + _table(["case", *(f"`{q}`" for q in qualities)], map(line, oracle["exact"]))
+        + "\n\nThe path tracer (512 paths a pixel) over Mitsuba 3.9.1, and the z-scores of tiles "
+        "of 8 × 8 pixels:\n\n" + _table(["case", "ratio of the means", "std of z", "largest z"], paths)
     )
 
 

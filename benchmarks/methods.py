@@ -49,7 +49,7 @@ def full() -> list[Method]:
     """All methods. A family's coarsest setting comes first; `finest` knows the last."""
     found = [Method(name=p, family=p, value=0, quality=nubis.quality(p)) for p in PRESETS]
     found += [_view_steps("balanced", n) for n in (24, 48, 96, 192, 384, 768, 1536)]
-    found += [_view_steps("high", n) for n in (32, 64, 128, 256, 512, 1024)]
+    found += [_view_steps("high", n) for n in (32, 64, 128, 256, 512)]
     found += [_light_steps("balanced", n) for n in (1, 2, 4, 8, 16, 32, 64)]
     found += [_light_steps("high", n) for n in (1, 2, 4, 8, 16, 32)]
     found += [_resolution(base, n) for base in ("balanced", "high") for n in (4, 3, 2, 1)]

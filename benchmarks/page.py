@@ -436,7 +436,8 @@ def _oracle(oracle: Row) -> str:
         + "\n\nRelative RMSE, bias and largest error of the transmittance:\n\n"
         + _table(["case", *(f"`{q}`" for q in qualities)], map(line, oracle["exact"]))
         + "\n\nThe path tracer (512 paths a pixel) over Mitsuba 3.9.1, and the z-scores of tiles "
-        "of 8 × 8 pixels:\n\n" + _table(["case", "ratio of the means", "std of z", "largest z"], paths)
+        "of 8 × 8 pixels:\n\n"
+        + _table(["case", "ratio of the means", "std of z", "largest z"], paths)
     )
 
 

@@ -603,7 +603,7 @@ fn write_hdr(py: Python<'_>, path: PathBuf, frame: PyReadonlyArrayDyn<'_, f32>) 
 mod _nubis {
     #[pymodule_export]
     use super::{
-        Camera, DensityGrid, Renderer, adapters, check, check_params, check_quality, number, quality, to_srgb8, write_exr,
-        write_hdr, write_png,
+        Camera, DensityGrid, Renderer, adapters, check, check_params, check_quality, number, quality, to_srgb8,
+        write_exr, write_hdr, write_png,
     };
 }

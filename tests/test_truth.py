@@ -177,3 +177,13 @@ def test_paths_in_the_sky(renderer):
         for a in (0.0, 0.9)
     )
     assert np.isfinite([dark, bright]).all() and bright > 1.3 * dark > 0
+
+
+def test_the_reference_ends_where_positions_are_rounded(renderer):
+    """From the planet's centre the clouds are 6,372 km away, where f32 knows half metres: panels
+    that cannot be made shorter are taken as they are.
+    """
+    radius = nubis.Params().atmosphere.planet_radius
+    camera = nubis.Camera.look_at((0, 0, -radius), (1e6, 7e4, -radius - 1e4), fov_y=0.001)
+    layers = renderer(4, 4, "reference").render_layers(camera, nubis.Params())
+    assert all(np.isfinite(layers[name]).all() for name in ("radiance", "transmittance"))

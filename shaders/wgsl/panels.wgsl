@@ -30,7 +30,12 @@ fn panel_from(origin: vec3f, direction: vec3f, s: Stretches, x: f32, longest: f3
         end = min(end, next_plane(origin, direction, s.start + x) - s.start);
     }
     // Never without progress, whatever was rounded (hazard 17).
-    return Panel(x, max(end, x + max(4e-7 * (s.start + x), 1e-4)));
+    return Panel(x, max(end, x + shortest_panel(s, x)));
+}
+
+// No panel is shorter, m: far from the eye positions are rounded by more than a millimetre.
+fn shortest_panel(s: Stretches, x: f32) -> f32 {
+    return max(4e-7 * (s.start + x), 1e-3);
 }
 
 // The two points of a panel, in metres into the stretches.

@@ -19,8 +19,6 @@ const THICKEST = 0.5;
 // Largest difference of the optical depths toward the sun from the two points of a panel, before any halving: behind a
 // steep edge the light may come and go within one.
 const UNEVEN = 0.5;
-// Panels are never made shorter, m.
-const SHORTEST = 1e-3;
 // Where a ray ends: behind it even light of full strength does not matter.
 const OPAQUE = 18.0;
 // A ray is cut into no more panels than that before any halving, whatever the size of its features: long rays through
@@ -108,7 +106,7 @@ fn reference(@builtin(global_invocation_id) id: vec3u) {
                     add = true;
                 }
             }
-        } else if depth > finer * THICKEST && panel.end - panel.begin > SHORTEST {
+        } else if depth > finer * THICKEST && panel.end - panel.begin > 1.5 * shortest_panel(s, x) {
             ray.longest = (panel.end - panel.begin) * max(0.9 * finer * THICKEST / depth, 0.1);
         } else {
             ray.end = panel.end;
@@ -152,7 +150,7 @@ fn reference(@builtin(global_invocation_id) id: vec3u) {
             let uneven = abs(ray.sun_depth - ray.first_depth) > finer * UNEVEN
                 && weight * abs(sun.x - sun.y) > 0.1 * quality.tolerance * (ray.sun + DARK);
             ray.stage = VIEW;
-            if uneven && ray.end - ray.x > SHORTEST {
+            if uneven && ray.end - ray.x > 1.5 * shortest_panel(stretches, ray.x) {
                 ray.longest = 0.5 * (ray.end - ray.x);
             } else {
                 var sum = Gathered(ray.sun, ray.above, ray.below, ray.weight, ray.distance);

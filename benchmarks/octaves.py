@@ -228,7 +228,10 @@ def main() -> None:
         mean["worst_rel_rmse"] = max(e["rel_rmse"] for e in kept)
         rows.append({"octaves": count, "constants": constants.tolist(), "what": what, **mean})
     noise = float(np.mean([np.sqrt(np.mean((c.noise / c.truth) ** 2)) for c in found]))
-    head = measure.header(["benchmarks.octaves", *sys.argv[1:]]) | {"size": SIZE, "samples": args.samples}
+    head = measure.header(["benchmarks.octaves", *sys.argv[1:]]) | {
+        "size": SIZE,
+        "samples": args.samples,
+    }
     result = {"header": head, "cases": [c.name for c in found], "noise": noise, "rows": rows}
     args.out.mkdir(parents=True, exist_ok=True)
     (args.out / "octaves.json").write_text(json.dumps(result, indent=1) + "\n")

@@ -266,6 +266,8 @@ impl Camera {
 #[derive(PartialEq)]
 struct DensityGrid(Arc<CoreGrid>);
 
+type GridState<'py> = (Bound<'py, PyAny>, [[f64; 3]; 2]);
+
 #[pymethods]
 impl DensityGrid {
     #[new]
@@ -333,7 +335,7 @@ impl DensityGrid {
         fnv(bits.chain(self.0.extinction().iter().map(|v| u64::from((v + 0.0).to_bits()))))
     }
 
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyAny>, [[f64; 3]; 2]))> {
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, GridState<'py>)> {
         let corners = slf.get().0.bounds().map(|corner| corner.to_array());
         Ok((slf.get_type().into_any(), (slf.get().extinction(slf.py())?, corners)))
     }

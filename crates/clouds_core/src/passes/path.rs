@@ -12,5 +12,5 @@ pub const RAY_BYTES: u64 = 176;
 /// Traces the paths of the band of `frame`.
 pub(crate) fn run(ctx: &mut Context<'_>, scene: &Scene<'_>, frame: &Frame, rays: &Rays, out: &Marched) -> Result<()> {
     let kernel = ctx.gpu.kernel("path", "path", scene.variant)?;
-    rays.run(ctx, scene, frame, &kernel, "path_rays", &out.bindings(), frame.width * frame.rows)
+    rays.run(ctx, scene, frame, &kernel, "path_rays", &out.bindings())
 }

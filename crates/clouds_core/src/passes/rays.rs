@@ -31,7 +31,7 @@ impl Rays {
         }
     }
 
-    /// Runs `kernel` until every one of `rays` is done. `state` is the variable that the rays are kept in.
+    /// Runs `kernel` until the ray of each pixel of the band is done. `state` is the variable that they are kept in.
     pub fn run(
         &self,
         ctx: &mut Context<'_>,
@@ -40,7 +40,6 @@ impl Rays {
         kernel: &Kernel,
         state: &'static str,
         outputs: &Bindings<'_>,
-        rays: u32,
     ) -> Result<()> {
         let mut clear = ctx.gpu.work();
         clear.clear(&self.state);
@@ -52,7 +51,7 @@ impl Rays {
             ("uncertainty", (&self.uncertainty).into()),
         ];
         let bindings = [scene.bindings.as_slice(), outputs, &ours].concat();
-        let mut active: Vec<u32> = (0..rays).collect();
+        let mut active: Vec<u32> = (0..frame.width * frame.rows).collect();
         let mut budget = 32;
         while !active.is_empty() {
             let count = active.len() as u32;

@@ -12,5 +12,5 @@ pub const RAY_BYTES: u64 = 144;
 /// Integrates the band of `frame`.
 pub(crate) fn run(ctx: &mut Context<'_>, scene: &Scene<'_>, frame: &Frame, rays: &Rays, out: &Marched) -> Result<()> {
     let kernel = ctx.gpu.kernel("reference", "reference", scene.variant)?;
-    rays.run(ctx, scene, frame, &kernel, "reference_rays", &out.bindings(), frame.width * frame.rows)
+    rays.run(ctx, scene, frame, &kernel, "reference_rays", &out.bindings())
 }

@@ -240,11 +240,13 @@ def test_a_little_change_changes_little(data):
 
     Not all: a row of them may be on the horizon, and a step of the march may fall on the other side
     of a cloud's edge. Without jitter, which is noise; for g to 0.999, because at 0.9999 the forward
-    peak itself changes by 3 % with a millionth of g; and for shells of 100 m at least that do not
-    lean by more than ten times their thickness, because a millimetre moves 20 m in one that leans
-    by 20 km a metre.
+    peak itself changes by 3 % with a millionth of g; and for shells and grids of 100 m at least
+    that do not lean by more than ten times their thickness, because a millimetre moves 20 m in one
+    that leans by 20 km a metre.
     """
     params = data.draw(strategies.params(**STEADY))
+    if params.volume is not None:
+        assume(np.subtract(*params.volume.bounds[::-1]).min() >= 100)
     light, clouds = params.light, params.clouds
     thickness = max(clouds.top - clouds.base, 100.0)
     lean = min(abs(params.wind.shear), 10 * thickness)
@@ -364,7 +366,8 @@ def test_any_animation(data):
     for frame in make.animate(shots + shots[-1:] * 16, background=background):
         assert np.isfinite(frame).all() and frame.min() >= 0
         assert frame[..., 3].max() <= 1
-    assert frame.tobytes() == still.tobytes()
+    # A static shot goes on tracing paths.
+    assert params.light.model == "path" or frame.tobytes() == still.tobytes()
 
 
 def moved(camera, eye):
@@ -518,7 +521,7 @@ def test_wrong_values_of_parameters(field, data):
         value = data.draw(st.one_of(st.just(value), beyond))
         if filled(hint, 0) != 0 and data.draw(st.booleans()):
             value = (low, high, value)
-    elif (hint, value) == (bool, True) or (name, value) == ("map", None):
+    elif (hint is bool and value is True) or (name == "map" and value is None):
         return
     with pytest.raises(ParameterError):
         CLASSES[group](**{name: value})

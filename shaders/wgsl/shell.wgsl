@@ -47,11 +47,11 @@ fn hit_ground_from(p: vec3f, direction: vec3f) -> Hit {
     return crossing(b, max(h, 0.0) * (2.0 * radius + h));
 }
 
-// Altitude of a point.
+// Altitude of a point. The planet's centre is as far from itself as a millimetre: 0 / 0 is no altitude.
 fn altitude_at(p: vec3f) -> f32 {
     let rh = frame.centre_distance;
     let d = dot(p, p) + 2.0 * rh * dot(frame.zenith, p);
-    return frame.altitude + d / (rh + sqrt(max(rh * rh + d, 0.0)));
+    return frame.altitude + d / max(rh + sqrt(max(rh * rh + d, 0.0)), 1e-3);
 }
 
 // Cosine between a unit direction and the local zenith at a point.

@@ -79,6 +79,8 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
         let ends = ray.x >= length;
 
         if ray.draws > MOST_TURNS {
+            // Where it was on its way to the eye's background, to the background.
+            ray.seen += select(0.0, 1.0, ray.scatterings == 0u);
             ray = path_ended(ray);
         } else if ray.stage == FLIGHT {
             if real > u.y {

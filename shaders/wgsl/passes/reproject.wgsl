@@ -75,7 +75,9 @@ fn reproject(@builtin(global_invocation_id) id: vec3u) {
         value = vec4f(0.0, 0.0, 0.0, 1.0);
     }
     clouds[index] = vec4f(max(value.rgb, vec3f(0.0)), saturate(value.a));
-    cloud_depth[index] = select(max(value_depth, 0.0), -1.0, value.a >= 1.0);
+    // Thinner than f32 tells from nothing, a cloud may still shine from where it is.
+    let clear = value.a >= 1.0 && all(value.rgb <= vec3f(0.0));
+    cloud_depth[index] = select(max(value_depth, 0.0), -1.0, clear);
     known[index] = select(0u, 1u, value_known);
 }
 

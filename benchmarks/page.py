@@ -425,6 +425,7 @@ def _oracle(oracle: Row) -> str:
     paths = [
         [
             row["case"],
+            str(row["paths"]),
             f"{row['ratio']:.4f} ± {row['ratio_error']:.4f}",
             f"{row['z_std']:.2f}",
             f"{row['z_max']:.2f}",
@@ -435,9 +436,8 @@ def _oracle(oracle: Row) -> str:
         _about(oracle["header"])
         + "\n\nRelative RMSE, bias and largest error of the transmittance:\n\n"
         + _table(["case", *(f"`{q}`" for q in qualities)], map(line, oracle["exact"]))
-        + "\n\nThe path tracer (512 paths a pixel) over Mitsuba 3.9.1, and the z-scores of tiles "
-        "of 8 × 8 pixels:\n\n"
-        + _table(["case", "ratio of the means", "std of z", "largest z"], paths)
+        + "\n\nThe path tracer over Mitsuba 3.9.1, and the z-scores of tiles of 8 × 8 pixels:\n\n"
+        + _table(["case", "paths a pixel", "ratio of the means", "std of z", "largest z"], paths)
     )
 
 

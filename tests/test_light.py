@@ -178,6 +178,18 @@ def test_single_scattering_has_no_artistic_part(renderer):
     assert plain.tobytes() == tinted.tobytes()
 
 
+@pytest.mark.parametrize("model", ["nubis2015", "thesis2018", "vsu2022", "octaves"])
+def test_ambient_light_alone(renderer, model):
+    """Without sun, a cloud is as bright as the light around it where it hides it."""
+    dark = {"light.model": model, "sun.irradiance": (0.0,) * 3, "light.ambient": (1.0, 2.0, 3.0)}
+    dark["clouds.extinction"] = 0.1
+    layers = renderer(32, 18).render_layers(CAMERAS["below"], lit_params(**dark))
+    opacity = 1 - layers["transmittance"]
+    assert opacity.max() > 0.5
+    expected = opacity[..., None] * [1.0, 2.0, 3.0]
+    np.testing.assert_allclose(layers["radiance"], expected, rtol=1e-4, atol=1e-6)
+
+
 def energy(depth, precipitation=0.0, **light):
     params = nubis.Params().with_(**{f"light.{name}": value for name, value in light.items()})
     inputs = np.stack(np.broadcast_arrays(depth, precipitation), axis=-1)

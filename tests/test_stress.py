@@ -236,17 +236,20 @@ def nudged(value, low, high):
 
 @stress(0.22, st.data())
 def test_a_little_change_changes_little(data):
-    """A millionth of a parameter, a millimetre, a tenth of a microradian, a microsecond (a millimetre
-    of the fastest wind): five pixels in six stay within 2 %.
+    """A millionth of a parameter, a millimetre, a tenth of a microradian, a microsecond (in it the
+    fastest wind blows a millimetre): five pixels in six stay within 2 %.
 
     Not all: a row of them may be on the horizon, and a step of the march may fall on the other side
-    of a cloud's edge. Without jitter, which is noise; for g to 0.999, because at 0.9999 the forward
-    peak itself changes by 3 % with a millionth of g; for shells and grids of 100 m at least that do
-    not lean by more than ten times their thickness, because a millimetre moves 20 m in one that
-    leans by 20 km a metre, nor twist detail by more than a tenth of the twists' size, because it
-    moves 60 mm where 100 m of twist change every 10 m; for planets to 10 000 km, because a level ray
-    meets high clouds of one of a million kilometres 100 m farther; and for an eye 10 cm at least from where
-    something begins, because a millimetre is a tenth of a centimetre.
+    of a cloud's edge. Without jitter, which is noise. And only where such changes are small:
+
+    - g to 0.999: at 0.9999 the forward peak itself changes by 3 % with a millionth of g;
+    - shells and grids of 100 m at least that lean by at most ten times their thickness: in one that
+      leans by 20 km a metre, a millimetre moves 20 m;
+    - twists of at most a tenth of their size: where 100 m of twist change every 10 m, a millimetre
+      moves 60 mm of detail;
+    - planets to 10 000 km: around one of a million kilometres a level ray that turns by a
+      microradian meets the high clouds 1 km farther;
+    - an eye 10 cm at least from where something begins.
     """
     params = data.draw(strategies.params(**STEADY))
     if params.volume is not None:

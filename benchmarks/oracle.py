@@ -19,7 +19,7 @@ sys.path.insert(0, str(reference.ROOT / "tests"))
 import test_oracle
 
 QUALITIES = "reference", "high", "balanced"
-# Paths a pixel: the standard error of the mean is a quarter of a percent or less.
+# Paths a pixel: the standard error of the mean is about a quarter of a percent at most.
 PATHS = {"tau_60": 4096, "tau_20": 768}
 
 

@@ -79,8 +79,6 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
         let ends = ray.x >= length;
 
         if ray.draws > MOST_TURNS {
-            // Where it was on its way to the eye's background, to the background.
-            ray.seen += select(0.0, 1.0, ray.scatterings == 0u);
             ray = path_ended(ray);
         } else if ray.stage == FLIGHT {
             if real > u.y {
@@ -181,7 +179,6 @@ fn scattered_on(given: PathRay, pixel: vec2u) -> PathRay {
 fn escaped(given: PathRay, pixel: vec2u) -> PathRay {
     var ray = given;
     if ray.scatterings == 0u {
-        ray.seen += 1.0;
         return path_ended(ray);
     }
     ray.light += ray.throughput * params.light.ambient;
@@ -210,6 +207,8 @@ fn escaped(given: PathRay, pixel: vec2u) -> PathRay {
 
 fn path_ended(given: PathRay) -> PathRay {
     var ray = given;
+    // What met no cloud, cut or not, saw the eye's background.
+    ray.seen += select(0.0, 1.0, ray.scatterings == 0u);
     ray.radiance += ray.light;
     ray.squares += ray.light * ray.light;
     ray.done += 1u;

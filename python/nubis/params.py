@@ -341,6 +341,10 @@ class Quality(Block):
     min_transmittance : float
         Transmittance at which a ray ends; what is left is scaled away, not lost. Allowed: a number
         from 0 to 0.5.
+    contrast : float
+        Largest contrast between neighbouring rays, past which the pixels between them get rays of
+        their own. One pixel in sixteen is marched first; 0 marches all of them. Allowed: a number
+        from 0 to 1.
     jitter : bool
         Whether each ray starts at a blue-noise offset of up to one step. Allowed: True or False.
     view_distance : float
@@ -368,6 +372,7 @@ class Quality(Block):
     cone: float = 0.0
     cheap_light: float = 1.0
     min_transmittance: float = 0.01
+    contrast: float = 0.1
     jitter: bool = True
     view_distance: float = 400000.0
     tolerance: float = 0.0

@@ -43,6 +43,9 @@ override PRECISE: bool = false; // that grid is read by loads and in f32, not fi
 @group(0) @binding(21) var<storage, read_write> history_known: array<u32>; // 1 where marched since the cut, 0 where guessed
 @group(0) @binding(22) var<storage, read_write> known: array<u32>;
 
+// Pixels that are marched one by one: how many are in `active_rays` (passes/refine).
+@group(0) @binding(38) var<storage, read_write> ray_count: atomic<u32>;
+
 // Rays that take more steps than one dispatch may: what each remembers, which are not done, and how far each got.
 @group(0) @binding(33) var<storage, read_write> reference_rays: array<ReferenceRay>;
 @group(0) @binding(34) var<storage, read_write> path_rays: array<PathRay>;

@@ -18,8 +18,10 @@ params! {
         first_row: u32 = 0;
         /// Rows of this band.
         rows: u32 = 1;
-        /// Where the band starts in its buffers, in rows.
-        buffer_row: u32 = 0;
+        /// First row that the buffers hold: where this sheet of the picture begins.
+        sheet_row: u32 = 0;
+        /// Rows that they hold.
+        sheet_rows: u32 = 1;
         /// Every how many pixels one is marched, in both directions.
         stride: u32 = 1;
         /// Which of them, across.
@@ -35,8 +37,10 @@ params! {
         /// Shift of the blue noise from frame to frame.
         jitter_shift: f32 = 0.0;
 
-        /// Rays in this dispatch (passes/reference, passes/path).
+        /// Rays of the list in this dispatch (passes/march, passes/reference, passes/path).
         active_rays: u32 = 0;
+        /// The first of them (passes/march).
+        first_ray: u32 = 0;
         /// Turns that each may take.
         budget: u32 = 0;
         /// Number of the first path of each pixel (passes/path).

@@ -218,6 +218,9 @@ params! {
         cheap_light: f32 = 1.0, in 0..=1 "";
         /// Transmittance at which a ray ends; what is left is scaled away, not lost.
         min_transmittance: f32 = 0.01, in 0..=0.5 "";
+        /// Largest contrast between neighbouring rays, past which the pixels between them get rays of their own. One pixel in
+        /// sixteen is marched first; 0 marches all of them.
+        contrast: f32 = 0.1, in 0..=1 "";
         /// Whether each ray starts at a blue-noise offset of up to one step.
         jitter: bool = true;
         /// Farthest distance at which clouds are marched.
@@ -306,6 +309,7 @@ impl Quality {
             far_sample: true,
             cone: 0.12,
             cheap_light: 0.3,
+            contrast: 0.0,
             ..balanced.clone()
         };
         Ok(match name {
@@ -315,6 +319,7 @@ impl Quality {
                 steps_horizon: 96,
                 light_steps: 5,
                 cheap_light: 0.0,
+                contrast: 0.3,
                 path_samples: 16,
                 ..balanced
             },
@@ -323,6 +328,7 @@ impl Quality {
                 steps_horizon: 512,
                 light_steps: 32,
                 min_transmittance: 0.002,
+                contrast: 0.0,
                 path_samples: 256,
                 ..balanced
             },

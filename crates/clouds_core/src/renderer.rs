@@ -1,6 +1,7 @@
 //! The frame, top to bottom.
 
 use std::mem;
+use std::ops::Range;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -10,7 +11,7 @@ use crate::blue_noise;
 use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
-use crate::gpu::{Gpu, Interrupt, Timings, check_fork};
+use crate::gpu::{Gpu, Interrupt, Timings, Work, check_fork};
 use crate::kernel::{Kernel, Variant};
 use crate::params::{Model, Params, Quality};
 use crate::passes::composite::Composed;
@@ -19,11 +20,12 @@ use crate::passes::majorant::Majorants;
 use crate::passes::march::Marched;
 use crate::passes::noise::Noise;
 use crate::passes::rays::Rays;
+use crate::passes::refine::{COARSEST, Refined};
 use crate::passes::reproject::{History, ORDER, STRIDE};
 use crate::passes::sky::Sky;
 use crate::passes::volume::Volume;
 use crate::passes::weather::Weather;
-use crate::passes::{Bindings, Context, Scene, Uniforms, composite, march, path, points, reference, reproject};
+use crate::passes::{Bindings, Context, Scene, Uniforms, composite, march, path, points, reference, refine, reproject};
 use crate::shader::Linked;
 
 /// Makes pictures of one size with one numerical method on one device.
@@ -34,7 +36,7 @@ pub struct Renderer {
     world: World,
     still: Option<Still>,
     animation: Option<Animation>,
-    refined: Option<Refined>,
+    refining: Option<Refining>,
     march_pace: Pace,
     pixel_pace: Pace,
     /// Milliseconds on the GPU by kernel, for the last picture or answer.
@@ -78,17 +80,18 @@ impl Method {
     }
 }
 
-/// Buffers of the bands of a still, kept from one to the next.
+/// Buffers of the sheets of a still, kept from one to the next.
 struct Still {
     pixels: u64,
     method: Method,
+    refined: Refined,
     marched: Marched,
     composed: Composed,
     rays: Option<Rays>,
 }
 
 /// A picture that every frame of a static shot makes better, where frames are not reprojected.
-struct Refined {
+struct Refining {
     camera: Camera,
     params: Params,
     time: f64,
@@ -100,6 +103,7 @@ struct Refined {
 
 /// Buffers of whole pictures, and what reprojection remembers of the frame before.
 struct Animation {
+    refined: Refined,
     fresh: Marched,
     before: History,
     now: History,
@@ -132,7 +136,7 @@ impl Renderer {
             world: World::new(&gpu),
             still: None,
             animation: None,
-            refined: None,
+            refining: None,
             march_pace: pace,
             pixel_pace: pace,
             timings: Timings::default(),
@@ -189,52 +193,55 @@ impl Renderer {
 
         let [width, height] = self.size;
         let mut picture = Picture::default();
-        while frame.first_row < height {
-            let left = height - frame.first_row;
-            frame.rows = match method {
-                Method::March => self.march_pace.rows(width, left),
-                Method::Reference | Method::Path => (BAND_RAYS / width).clamp(1, left),
-            };
-            let pixels = u64::from(width) * u64::from(frame.rows);
+        for sheet in sheets([width, height], method) {
+            frame.sheet_row = sheet.start;
+            frame.rows = sheet.len() as u32;
+            // Lattices of rays meet in the first row of the next sheet.
+            let shared = u32::from(method == Method::March && quality.contrast > 0.0 && sheet.end < height);
+            frame.sheet_rows = frame.rows + shared;
+            let pixels = u64::from(width) * u64::from(frame.sheet_rows);
             if self.still.as_ref().is_none_or(|still| still.pixels < pixels || still.method != method) {
                 self.still = Some(Still::new(gpu, pixels, method));
             }
             let Some(still) = &self.still else { unreachable!("was just made") };
-            scene.uniforms.upload_frame(gpu, &frame);
 
-            let started = Instant::now();
             let mut ctx = Context { gpu, uniforms: scene.uniforms, variant: scene.variant, timings, interrupt };
-            let mut work = gpu.work();
             match (method, &still.rays) {
                 (Method::Reference, Some(rays)) => reference::run(&mut ctx, &scene, &frame, rays, &still.marched)?,
                 (Method::Path, Some(rays)) => path::run(&mut ctx, &scene, &frame, rays, &still.marched)?,
-                _ => march::run(gpu, &mut work, &scene, &frame, &still.marched)?,
-            }
-            composite::run(gpu, &mut work, &scene, &frame, &still.marched, &still.composed)?;
-            work.download(&still.composed.image, 0, 16 * pixels);
-            if all {
-                work.download(&still.composed.sky, 0, 16 * pixels);
-                work.download(&still.composed.depth, 0, 4 * pixels);
-                work.download(&still.marched.samples, 0, 4 * pixels);
-                if let Some(rays) = &still.rays {
-                    work.download(&rays.uncertainty, 0, 16 * pixels);
+                _ => {
+                    let pace = &mut self.march_pace;
+                    march_sheet(&mut ctx, &scene, &mut frame, quality, pace, &still.refined, &still.marched)?;
                 }
             }
-            let downloads = work.submit(timings, interrupt)?;
-            if method == Method::March {
-                self.march_pace.learn(pixels, started);
-            }
-
-            picture.image.extend_from_slice(downloads[0].numbers());
-            if all {
-                picture.sky.extend_from_slice(downloads[1].numbers());
-                picture.depth.extend_from_slice(downloads[2].numbers());
-                picture.samples.extend_from_slice(downloads[3].numbers());
-                if let Some(uncertainty) = downloads.get(4) {
-                    picture.uncertainty.extend_from_slice(uncertainty.numbers());
+            in_bands(&mut self.pixel_pace, gpu, &scene, &mut frame, [width, sheet.end], |frame| {
+                let mut work = gpu.work();
+                let marched = &still.marched;
+                composite::run(gpu, &mut work, &scene, frame, marched, &still.composed)?;
+                let first = u64::from(width) * u64::from(frame.first_row - frame.sheet_row);
+                let pixels = u64::from(width) * u64::from(frame.rows);
+                let layer = |work: &mut Work<'_>, buffer, bytes| work.download(buffer, bytes * first, bytes * pixels);
+                layer(&mut work, &still.composed.image, 16);
+                if all {
+                    layer(&mut work, &still.composed.sky, 16);
+                    layer(&mut work, &still.composed.depth, 4);
+                    layer(&mut work, &marched.samples, 4);
+                    if let Some(rays) = &still.rays {
+                        layer(&mut work, &rays.uncertainty, 16);
+                    }
                 }
-            }
-            frame.first_row += frame.rows;
+                let downloads = work.submit(timings, interrupt)?;
+                picture.image.extend_from_slice(downloads[0].numbers());
+                if all {
+                    picture.sky.extend_from_slice(downloads[1].numbers());
+                    picture.depth.extend_from_slice(downloads[2].numbers());
+                    picture.samples.extend_from_slice(downloads[3].numbers());
+                    if let Some(uncertainty) = downloads.get(4) {
+                        picture.uncertainty.extend_from_slice(uncertainty.numbers());
+                    }
+                }
+                Ok(())
+            })?;
         }
         Ok(picture)
     }
@@ -270,6 +277,7 @@ impl Renderer {
         let cells = [width.div_ceil(STRIDE), height.div_ceil(STRIDE)];
         let Self { gpu, world, quality, timings, .. } = self;
         let animation = self.animation.get_or_insert_with(|| Animation {
+            refined: Refined::new(gpu, pixels),
             fresh: Marched::new(gpu, u64::from(cells[0]) * u64::from(cells[1])),
             before: History::new(gpu, pixels),
             now: History::new(gpu, pixels),
@@ -290,11 +298,10 @@ impl Renderer {
         let scene = world.run(gpu, params, &frame, quality, timings, interrupt)?;
 
         if last.is_none() {
-            in_bands(&mut self.march_pace, gpu, &scene, &mut frame, [width, height], |frame| {
-                let mut work = gpu.work();
-                march::run(gpu, &mut work, &scene, frame, &animation.now.marched)?;
-                work.submit(timings, interrupt).map(drop)
-            })?;
+            let mut ctx = Context { gpu, uniforms: scene.uniforms, variant: scene.variant, timings, interrupt };
+            frame.sheet_rows = height;
+            let Animation { refined, now, .. } = &*animation;
+            march_sheet(&mut ctx, &scene, &mut frame, quality, &mut self.march_pace, refined, &now.marched)?;
             gpu.queue.write_buffer(&animation.now.known, 0, bytemuck::cast_slice(&vec![1u32; pixels as usize]));
         } else {
             frame.stride = STRIDE;
@@ -336,10 +343,10 @@ impl Renderer {
         background: bool,
         interrupt: Interrupt<'_>,
     ) -> Result<Vec<f32>> {
-        let same = |last: &Refined| {
+        let same = |last: &Refining| {
             (last.camera, last.time, last.background) == (*camera, time, background) && last.params == *params
         };
-        let last = self.refined.take().filter(same);
+        let last = self.refining.take().filter(same);
         let count = last.as_ref().map_or(0, |last| last.count);
         let image = match last {
             // What has converged stays.
@@ -354,7 +361,7 @@ impl Renderer {
                 }
             }
         };
-        let refined = Refined {
+        let refining = Refining {
             camera: *camera,
             params: params.clone(),
             time,
@@ -362,13 +369,13 @@ impl Renderer {
             image: image.clone(),
             count: count + 1,
         };
-        self.refined = Some(refined);
+        self.refining = Some(refining);
         Ok(image)
     }
 
     /// Forgets the frame before: the next one of [`Renderer::animate`] is a still.
     pub fn cut(&mut self) {
-        self.refined = None;
+        self.refining = None;
         if let Some(animation) = &mut self.animation {
             animation.last = None;
         }
@@ -541,6 +548,7 @@ impl Still {
         Self {
             pixels,
             method,
+            refined: Refined::new(gpu, pixels),
             marched: Marched::new(gpu, pixels),
             composed: Composed::new(gpu, pixels),
             rays: ray_bytes.map(|bytes| Rays::new(gpu, pixels, bytes)),
@@ -569,11 +577,66 @@ impl Shot {
 /// What a submission should take, in seconds: short enough for every GPU's watchdog and for Ctrl-C, long enough that
 /// submitting costs nothing.
 const BAND_SECONDS: f64 = 0.1;
-/// Most pixels of a band: 64 MiB a buffer, half of what lavapipe lets a shader see.
-const BAND_PIXELS: u32 = 1 << 22;
-
+/// Most pixels of a sheet, which is as much of a still as the device holds: 64 bytes each.
+const SHEET_PIXELS: u32 = 1 << 20;
 /// Most rays that are on their way together where they take many dispatches.
-const BAND_RAYS: u32 = 1 << 14;
+const SHEET_RAYS: u32 = 1 << 14;
+
+/// The rows of each sheet of a still.
+fn sheets([width, height]: [u32; 2], method: Method) -> impl Iterator<Item = Range<u32>> {
+    let rows = match method {
+        Method::March => (SHEET_PIXELS / width).next_multiple_of(COARSEST),
+        Method::Reference | Method::Path => SHEET_RAYS / width,
+    };
+    let rows = rows.clamp(1, height);
+    (0..height).step_by(rows as usize).map(move |row| row..(row + rows).min(height))
+}
+
+/// Marches a sheet of a still: the pixels of a lattice, then those between rays that do not look alike, or all of them.
+fn march_sheet(
+    ctx: &mut Context<'_>,
+    scene: &Scene<'_>,
+    frame: &mut Frame,
+    quality: &Quality,
+    pace: &mut Pace,
+    refined: &Refined,
+    out: &Marched,
+) -> Result<()> {
+    let (gpu, interrupt) = (ctx.gpu, ctx.interrupt);
+    if quality.contrast == 0.0 {
+        let size = [frame.width, frame.sheet_row + frame.sheet_rows];
+        return in_bands(pace, gpu, scene, frame, size, |frame| {
+            let mut work = gpu.work();
+            march::run(gpu, &mut work, scene, frame, out)?;
+            work.submit(ctx.timings, interrupt).map(drop)
+        });
+    }
+    let mut frame = frame.clone();
+    frame.stride = COARSEST;
+    let mut rays = refined.begin(gpu, &frame);
+    loop {
+        frame.first_ray = 0;
+        while frame.first_ray < rays {
+            frame.active_rays = pace.pixels().min(rays - frame.first_ray);
+            scene.uniforms.upload_frame(gpu, &frame);
+            let started = Instant::now();
+            let mut work = gpu.work();
+            march::run_list(gpu, &mut work, scene, &frame, &refined.list, out)?;
+            work.submit(ctx.timings, interrupt)?;
+            pace.learn(u64::from(frame.active_rays), started);
+            frame.first_ray += frame.active_rays;
+        }
+        if frame.stride == 1 {
+            return Ok(());
+        }
+        scene.uniforms.upload_frame(gpu, &frame);
+        let mut work = gpu.work();
+        refine::run(gpu, &mut work, scene, &frame, refined, out)?;
+        work.download(&refined.count, 0, 4);
+        rays = work.submit(ctx.timings, interrupt)?[0].numbers()[0];
+        frame.stride /= 2;
+    }
+}
 
 /// How many pixels a second buys, from the bands so far.
 #[derive(Clone, Copy)]
@@ -586,10 +649,15 @@ impl Pace {
         Self { pixels_per_second }
     }
 
+    /// Pixels of the next band: whole workgroups.
+    fn pixels(self) -> u32 {
+        let pixels = (self.pixels_per_second * BAND_SECONDS) as u32;
+        pixels.clamp(64, SHEET_PIXELS) / 64 * 64
+    }
+
     /// Rows of the next band: whole workgroups, at most `left`.
     fn rows(self, width: u32, left: u32) -> u32 {
-        let pixels = (self.pixels_per_second * BAND_SECONDS).min(f64::from(BAND_PIXELS));
-        let rows = (pixels / f64::from(width)) as u32 / 8 * 8;
+        let rows = self.pixels() / width / 8 * 8;
         rows.max(8).min(left)
     }
 
@@ -599,19 +667,18 @@ impl Pace {
     }
 }
 
-/// Runs `submit` for band after band of a picture whose buffers hold all of it.
+/// Runs `submit` for band after band of a sheet, from the row where it begins to that where it ends.
 fn in_bands(
     pace: &mut Pace,
     gpu: &Gpu,
     scene: &Scene<'_>,
     frame: &mut Frame,
-    [width, height]: [u32; 2],
+    [width, end]: [u32; 2],
     mut submit: impl FnMut(&Frame) -> Result<()>,
 ) -> Result<()> {
-    frame.first_row = 0;
-    while frame.first_row < height {
-        frame.rows = pace.rows(width, height - frame.first_row);
-        frame.buffer_row = frame.first_row;
+    frame.first_row = frame.sheet_row;
+    while frame.first_row < end {
+        frame.rows = pace.rows(width, end - frame.first_row);
         scene.uniforms.upload_frame(gpu, frame);
         let started = Instant::now();
         submit(frame)?;

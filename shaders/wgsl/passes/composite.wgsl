@@ -24,7 +24,7 @@ fn composite(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= frame.width || id.y >= frame.rows {
         return;
     }
-    let index = (frame.buffer_row + id.y) * frame.width + id.x;
+    let index = (frame.first_row + id.y - frame.sheet_row) * frame.width + id.x;
     let view = view_direction(vec2f(f32(id.x), f32(frame.first_row + id.y)) + 0.5);
     if view.w == 0.0 {
         image[index] = vec4f(0.0);

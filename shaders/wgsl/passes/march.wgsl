@@ -13,12 +13,25 @@ fn march(@builtin(global_invocation_id) id: vec3u) {
     let cell = vec2u(id.x, frame.first_row + id.y);
     // The last cells of a subset may hang over the edge; they march the edge.
     let pixel = min(cell * frame.stride + vec2u(frame.subpixel_x, frame.subpixel_y), vec2u(frame.width, frame.height) - 1u);
+    march_pixel(pixel, (cell.y - frame.sheet_row) * frame.march_width + id.x);
+}
+
+// Marches the pixels of a list (passes/refine).
+@compute @workgroup_size(64)
+fn march_list(@builtin(global_invocation_id) id: vec3u) {
+    if id.x >= frame.active_rays {
+        return;
+    }
+    let index = active_rays[frame.first_ray + id.x];
+    march_pixel(vec2u(index % frame.width, frame.sheet_row + index / frame.width), index);
+}
+
+fn march_pixel(pixel: vec2u, index: u32) {
     let view = view_direction(vec2f(pixel) + 0.5);
     var cloud = Cloud(vec3f(0.0), 1.0, -1.0);
     if view.w > 0.0 {
         cloud = march_ray(view.xyz, ray_offset(pixel));
     }
-    let index = (frame.buffer_row + id.y) * frame.march_width + id.x;
     clouds[index] = vec4f(cloud.radiance, cloud.transmittance);
     cloud_depth[index] = cloud.depth;
     samples[index] = evaluations;

@@ -32,7 +32,7 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let index = active_rays[id.x];
-    let pixel = vec2u(index % frame.width, frame.first_row + index / frame.width);
+    let pixel = vec2u(index % frame.width, frame.sheet_row + index / frame.width);
     let view = view_direction(vec2f(pixel) + 0.5);
     let pixel_size = pixel_width();
     let sunlit = any(sky_light[2].rgb > vec3f(0.0));

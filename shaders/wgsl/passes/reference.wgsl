@@ -37,7 +37,7 @@ fn reference(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let index = active_rays[id.x];
-    let pixel = vec2u(index % frame.width, frame.first_row + index / frame.width);
+    let pixel = vec2u(index % frame.width, frame.sheet_row + index / frame.width);
     let view = view_direction(vec2f(pixel) + 0.5);
     let direction = view.xyz;
     let stretches = cloud_stretches(direction);

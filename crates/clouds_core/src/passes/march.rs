@@ -33,6 +33,19 @@ impl Marched {
     }
 }
 
+/// Marches the pixels of a list: `frame.active_rays` of them from `frame.first_ray` on.
+pub(crate) fn run_list(
+    gpu: &Gpu,
+    work: &mut Work<'_>,
+    scene: &Scene<'_>,
+    frame: &Frame,
+    list: &wgpu::Buffer,
+    out: &Marched,
+) -> Result<()> {
+    let bindings = [scene.bindings.as_slice(), &out.bindings(), &[("active_rays", list.into())]].concat();
+    work.dispatch(&*gpu.kernel("march", "march_list", scene.variant)?, &bindings, [frame.active_rays, 1, 1])
+}
+
 /// Marches the band of `frame` through the `scene`.
 pub(crate) fn run(gpu: &Gpu, work: &mut Work<'_>, scene: &Scene<'_>, frame: &Frame, out: &Marched) -> Result<()> {
     let bindings = [scene.bindings.as_slice(), &out.bindings()].concat();

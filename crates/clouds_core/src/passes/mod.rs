@@ -9,6 +9,7 @@ pub mod path;
 pub mod points;
 pub mod rays;
 pub mod reference;
+pub mod refine;
 pub mod reproject;
 pub mod sky;
 pub mod volume;

@@ -1,0 +1,53 @@
+//! Which pixels are marched: a coarse lattice, then those between rays that do not look alike.
+
+use super::Scene;
+use super::march::Marched;
+use crate::error::Result;
+use crate::frame::Frame;
+use crate::gpu::{Gpu, Work};
+
+/// Distance of the pixels that are marched first.
+pub(crate) const COARSEST: u32 = 4;
+
+/// The pixels to be marched next.
+pub(crate) struct Refined {
+    /// Their numbers in the sheet.
+    pub list: wgpu::Buffer,
+    /// How many there are.
+    pub count: wgpu::Buffer,
+}
+
+impl Refined {
+    pub fn new(gpu: &Gpu, pixels: u64) -> Self {
+        Self { list: gpu.buffer("active_rays", 4 * pixels), count: gpu.buffer("ray_count", 4) }
+    }
+
+    /// Begins with the lattice, of which the last column and row are a part. Returns how many pixels it has.
+    pub fn begin(&self, gpu: &Gpu, frame: &Frame) -> u32 {
+        let along = |size: u32| {
+            let last = size - 1;
+            (0..last).step_by(COARSEST as usize).chain([last])
+        };
+        let lattice: Vec<u32> =
+            along(frame.sheet_rows).flat_map(|y| along(frame.width).map(move |x| y * frame.width + x)).collect();
+        gpu.queue.write_buffer(&self.list, 0, bytemuck::cast_slice(&lattice));
+        lattice.len() as u32
+    }
+}
+
+/// Halves the distance `frame.stride` of the lattice: interpolates `out`, or lists pixels to be marched.
+pub(crate) fn run(
+    gpu: &Gpu,
+    work: &mut Work<'_>,
+    scene: &Scene<'_>,
+    frame: &Frame,
+    refined: &Refined,
+    out: &Marched,
+) -> Result<()> {
+    let ours = [("active_rays", (&refined.list).into()), ("ray_count", (&refined.count).into())];
+    let bindings = [scene.bindings.as_slice(), &out.bindings(), &ours].concat();
+    let half = frame.stride / 2;
+    let [width, height] = [frame.width, frame.sheet_rows].map(|size| (size - 1).div_ceil(half) + 1);
+    work.clear(&refined.count);
+    work.dispatch(&*gpu.kernel("refine", "refine", scene.variant)?, &bindings, [width, height, 1])
+}

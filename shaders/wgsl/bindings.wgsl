@@ -6,6 +6,8 @@
 override MODEL: u32 = 0u; // light.model
 override VOLUME: bool = false; // the clouds are the user's grid, not procedural
 override PRECISE: bool = false; // that grid is read by loads and in f32, not filtered by the hardware in half floats
+override LIGHT_DETAIL: bool = true; // there are light samples that see the detail
+override LIGHT_CHEAP: bool = true; // there are light samples that do not
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<uniform> frame: Frame;

@@ -22,13 +22,17 @@ fn optical_depth_to_sun(p: vec3f, opacity: f32, width: f32) -> f32 {
     var depth = 0.0;
     // Behind little cloud the near samples see the detail; the others are cheap.
     let full = select(0u, n, opacity < quality.cheap_light);
-    for (var i = 0u; i < full; i++) {
-        let at = light_sample(samples, p, i, width);
-        depth += cloud_density_at(at.p, at.altitude, at.width) * at.length;
+    if LIGHT_DETAIL {
+        for (var i = 0u; i < full; i++) {
+            let at = light_sample(samples, p, i, width);
+            depth += cloud_density_at(at.p, at.altitude, at.width) * at.length;
+        }
     }
-    for (var i = full; i < n + quality.far_sample; i++) {
-        let at = light_sample(samples, p, i, width);
-        depth += cloud_density_cheap(at.p, at.altitude, at.width) * at.length;
+    if LIGHT_CHEAP {
+        for (var i = full; i < n + quality.far_sample; i++) {
+            let at = light_sample(samples, p, i, width);
+            depth += cloud_density_cheap(at.p, at.altitude, at.width) * at.length;
+        }
     }
     return depth * frame.extinction;
 }

@@ -35,18 +35,34 @@ pub(crate) struct Variant {
     pub volume: bool,
     /// Whether that grid is read in f32.
     pub precise: bool,
+    /// Whether there are light samples that see the detail.
+    pub light_detail: bool,
+    /// Whether there are light samples that do not.
+    pub light_cheap: bool,
 }
 
 impl Variant {
     /// What a picture needs.
     pub fn new(params: &Params, quality: &Quality) -> Self {
         let model = params.light.model;
-        Self { model, volume: params.volume.is_some(), precise: quality.tolerance > 0.0 || model == Model::Path }
+        Self {
+            model,
+            volume: params.volume.is_some(),
+            precise: quality.tolerance > 0.0 || model == Model::Path,
+            light_detail: quality.cheap_light > 0.0,
+            light_cheap: quality.cheap_light < 1.0 || quality.far_sample,
+        }
     }
 
-    fn constants(self) -> [(&'static str, f64); 3] {
+    fn constants(self) -> [(&'static str, f64); 5] {
         let switch = |on| f64::from(u8::from(on));
-        [("MODEL", f64::from(self.model as u32)), ("VOLUME", switch(self.volume)), ("PRECISE", switch(self.precise))]
+        [
+            ("MODEL", f64::from(self.model as u32)),
+            ("VOLUME", switch(self.volume)),
+            ("PRECISE", switch(self.precise)),
+            ("LIGHT_DETAIL", switch(self.light_detail)),
+            ("LIGHT_CHEAP", switch(self.light_cheap)),
+        ]
     }
 }
 

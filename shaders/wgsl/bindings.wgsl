@@ -45,8 +45,10 @@ override LIGHT_CHEAP: bool = true; // there are light samples that do not
 @group(0) @binding(21) var<storage, read_write> history_known: array<u32>; // 1 where marched since the cut, 0 where guessed
 @group(0) @binding(22) var<storage, read_write> known: array<u32>;
 
-// Pixels that are marched one by one: how many are in `active_rays` (passes/refine).
+// Pixels that are marched one by one: how many are in `active_rays`, and between which distances from the start of its
+// march each pixel's ray meets cloud (passes/refine).
 @group(0) @binding(38) var<storage, read_write> ray_count: atomic<u32>;
+@group(0) @binding(39) var<storage, read_write> cloud_span: array<vec2f>;
 
 // Rays that take more steps than one dispatch may: what each remembers, which are not done, and how far each got.
 @group(0) @binding(33) var<storage, read_write> reference_rays: array<ReferenceRay>;

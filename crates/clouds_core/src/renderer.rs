@@ -621,7 +621,7 @@ fn march_sheet(
             scene.uniforms.upload_frame(gpu, &frame);
             let started = Instant::now();
             let mut work = gpu.work();
-            march::run_list(gpu, &mut work, scene, &frame, &refined.list, out)?;
+            march::run_list(gpu, &mut work, scene, &frame, refined, out)?;
             work.submit(ctx.timings, interrupt)?;
             pace.learn(u64::from(frame.active_rays), started);
             frame.first_ray += frame.active_rays;

@@ -5,6 +5,9 @@
 #import density
 #import light
 
+// Distance of the pixels that are marched first (as in refine.rs).
+const COARSEST = 4u;
+
 @compute @workgroup_size(8, 8)
 fn march(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= frame.march_width || id.y >= frame.rows {
@@ -13,7 +16,8 @@ fn march(@builtin(global_invocation_id) id: vec3u) {
     let cell = vec2u(id.x, frame.first_row + id.y);
     // The last cells of a subset may hang over the edge; they march the edge.
     let pixel = min(cell * frame.stride + vec2u(frame.subpixel_x, frame.subpixel_y), vec2u(frame.width, frame.height) - 1u);
-    march_pixel(pixel, (cell.y - frame.sheet_row) * frame.march_width + id.x);
+    let index = (cell.y - frame.sheet_row) * frame.march_width + id.x;
+    march_pixel(pixel, index, EVERYWHERE);
 }
 
 // Marches the pixels of a list (passes/refine).
@@ -23,24 +27,33 @@ fn march_list(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let index = active_rays[frame.first_ray + id.x];
-    march_pixel(vec2u(index % frame.width, frame.sheet_row + index / frame.width), index);
+    let pixel = vec2u(index % frame.width, frame.sheet_row + index / frame.width);
+    // Rays of the coarsest lattice look everywhere, later ones where their neighbours have found cloud.
+    let known = select(cloud_span[index], EVERYWHERE, frame.stride == COARSEST);
+    cloud_span[index] = march_pixel(pixel, index, known);
 }
 
-fn march_pixel(pixel: vec2u, index: u32) {
+const EVERYWHERE = vec2f(0.0, 1e30);
+const NOWHERE = vec2f(1e30, 0.0);
+
+// Marches a pixel's ray within a span, and returns the span of its clouds.
+fn march_pixel(pixel: vec2u, index: u32, within: vec2f) -> vec2f {
     let view = view_direction(vec2f(pixel) + 0.5);
-    var cloud = Cloud(vec3f(0.0), 1.0, -1.0);
+    var cloud = Cloud(vec3f(0.0), 1.0, -1.0, NOWHERE);
     if view.w > 0.0 {
-        cloud = march_ray(view.xyz, ray_offset(pixel));
+        cloud = march_ray(view.xyz, ray_offset(pixel), within);
     }
     clouds[index] = vec4f(cloud.radiance, cloud.transmittance);
     cloud_depth[index] = cloud.depth;
     samples[index] = evaluations;
+    return cloud.span;
 }
 
 struct Cloud {
     radiance: vec3f, // premultiplied
     transmittance: f32,
     depth: f32, // m, -1 where there is none
+    span: vec2f, // from the first to the last cloud, m from the start of the march; without end behind an opaque one
 }
 
 // One blue-noise offset of up to a step for the whole ray: it turns bands into fine noise at no cost in error, where
@@ -98,7 +111,15 @@ fn march_sample(s: Stretches, steps: Steps, direction: vec3f, offset: f32, i: u3
     return Sample(p, t, altitude_at(p), length, max(t * pixel_size, 0.3 * length));
 }
 
-fn march_ray(direction: vec3f, offset: f32) -> Cloud {
+// At which step a distance is reached.
+fn step_index(steps: Steps, distance: f32) -> f32 {
+    if steps.growth == 0.0 {
+        return distance / steps.length * f32(steps.count);
+    }
+    return log2(1.0 + steps.growth * distance) / steps.scale;
+}
+
+fn march_ray(direction: vec3f, offset: f32, within: vec2f) -> Cloud {
     let stretches = cloud_stretches(direction);
     let room = max(quality.view_distance - stretches.start, 0.0);
     let length = min(stretches.first + stretches.second, room);
@@ -107,7 +128,7 @@ fn march_ray(direction: vec3f, offset: f32) -> Cloud {
     var optical_depth = 0.0;
     var transmittance = 1.0;
     if length <= 0.0 || (!VOLUME && params.clouds.coverage <= 0.0) {
-        return Cloud(vec3f(0.0), 1.0, -1.0);
+        return Cloud(vec3f(0.0), 1.0, -1.0, NOWHERE);
     }
     let steps = ray_steps(stretches.start, length, direction);
     let pixel_size = pixel_width();
@@ -117,18 +138,21 @@ fn march_ray(direction: vec3f, offset: f32) -> Cloud {
     var sum = Gathered();
 
     let big = quality.big_step;
-    var i = 0u; // the step at hand
-    var seen = 0u; // steps below this one have had their full sample
+    let slack = f32(big + 1u);
+    let end = u32(clamp(step_index(steps, within.y) + slack, 0.0, f32(steps.count)));
+    var i = u32(clamp(step_index(steps, within.x) - slack, 0.0, f32(steps.count))); // the step at hand
+    var span = NOWHERE;
+    var seen = i; // steps below this one have had their full sample
     var empty = quality.empty_samples; // full samples of zero in a row; from that many on, samples are cheap
     // A loop in a loop, and no branch with much behind it: lavapipe runs both sides of every branch, and skips only loops
     // that none of its eight rays is in. Each ray of a group goes on to its next cloud, and all take the dear part, the
     // light, together; a GPU's rays do likewise. Measured: 2.6 times as fast as one loop of branches.
-    while i < steps.count {
+    while i < end {
         var at: Sample;
         var column: Column;
         var shape = 0.0;
         // On to the next cloud: big steps with cheap samples outside, back by what was leapt over on a hit.
-        while i < steps.count && shape <= 0.0 {
+        while i < end && shape <= 0.0 {
             at = march_sample(stretches, steps, direction, offset, i, pixel_size);
             column = cloud_column(at.p, at.altitude);
             shape = cloud_shape(column, at.width);
@@ -145,7 +169,7 @@ fn march_ray(direction: vec3f, offset: f32) -> Cloud {
             }
         }
         // Not "shape > 0": with that, a NaN would stand still for ever.
-        if i < steps.count && !(shape <= 0.0) {
+        if i < end && !(shape <= 0.0) {
             i += 1u;
             seen = i;
             empty += 1u;
@@ -160,16 +184,18 @@ fn march_ray(direction: vec3f, offset: f32) -> Cloud {
                 }
                 let sun = sun_scattering(depth_to_sun, column.precipitation, one_minus_mu);
                 sum = gather(sum, weight, sun, column.height, at.t);
+                let from_start = step_distance(steps, f32(i));
+                span = vec2f(min(span.x, from_start - at.length), from_start);
                 optical_depth += x;
                 transmittance = transmittance_of(optical_depth);
                 if transmittance < quality.min_transmittance {
-                    i = steps.count;
+                    i = end;
                 }
             }
         }
     }
     if sum.weight <= 0.0 {
-        return Cloud(vec3f(0.0), 1.0, -1.0);
+        return Cloud(vec3f(0.0), 1.0, -1.0, NOWHERE);
     }
 
     var scale = 1.0;
@@ -177,6 +203,7 @@ fn march_ray(direction: vec3f, offset: f32) -> Cloud {
         // What the rest of the ray would have added is taken to be like what was seen.
         scale = 1.0 / (1.0 - transmittance);
         transmittance = 0.0;
+        span.y = EVERYWHERE.y;
     }
-    return Cloud(scale * gathered_radiance(sum), transmittance, sum.distance / sum.weight);
+    return Cloud(scale * gathered_radiance(sum), transmittance, sum.distance / sum.weight, span);
 }

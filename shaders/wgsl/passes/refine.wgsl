@@ -23,9 +23,12 @@ fn refine(@builtin(global_invocation_id) id: vec3u) {
     let after = select(min(pixel + frame.stride, last), high, is_new);
     var least = vec2f(1e30);
     var most = vec2f(0.0);
+    var span = vec2f(1e30, 0.0);
     for (var i = 0u; i < 9u; i++) {
         let corner = array<vec2u, 3>(before, select(pixel, low, is_new), after);
-        let value = clouds[index_of(vec2u(corner[i % 3u].x, corner[i / 3u].y))];
+        let at = index_of(vec2u(corner[i % 3u].x, corner[i / 3u].y));
+        let value = clouds[at];
+        span = vec2f(min(span.x, cloud_span[at].x), max(span.y, cloud_span[at].y));
         let brightness = vec2f(max(max(value.r, value.g), value.b), value.a);
         least = min(least, brightness);
         most = max(most, brightness);
@@ -35,6 +38,7 @@ fn refine(@builtin(global_invocation_id) id: vec3u) {
     let against = max(most.x, most.y * max(max(backdrop.r, backdrop.g), backdrop.b));
     let contrast = max(most.y - least.y, (most.x - least.x) / max(against, 1e-30));
     let index = index_of(pixel);
+    cloud_span[index] = span;
     if contrast > quality.contrast {
         active_rays[atomicAdd(&ray_count, 1u)] = index;
         return;

@@ -1,5 +1,6 @@
 //! The march through the clouds, of every pixel or of a subset.
 
+use super::refine::Refined;
 use super::{Bindings, Scene};
 use crate::error::Result;
 use crate::frame::Frame;
@@ -39,10 +40,10 @@ pub(crate) fn run_list(
     work: &mut Work<'_>,
     scene: &Scene<'_>,
     frame: &Frame,
-    list: &wgpu::Buffer,
+    refined: &Refined,
     out: &Marched,
 ) -> Result<()> {
-    let bindings = [scene.bindings.as_slice(), &out.bindings(), &[("active_rays", list.into())]].concat();
+    let bindings = [scene.bindings.as_slice(), &out.bindings(), &refined.bindings()].concat();
     work.dispatch(&*gpu.kernel("march", "march_list", scene.variant)?, &bindings, [frame.active_rays, 1, 1])
 }
 

@@ -1,6 +1,6 @@
 //! Which pixels are marched: a coarse lattice, then those between rays that do not look alike.
 
-use super::Scene;
+use super::{Bindings, Scene};
 use super::march::Marched;
 use crate::error::Result;
 use crate::frame::Frame;
@@ -15,11 +15,21 @@ pub(crate) struct Refined {
     pub list: wgpu::Buffer,
     /// How many there are.
     pub count: wgpu::Buffer,
+    /// Between which distances the ray of each pixel of the sheet meets cloud.
+    pub span: wgpu::Buffer,
 }
 
 impl Refined {
     pub fn new(gpu: &Gpu, pixels: u64) -> Self {
-        Self { list: gpu.buffer("active_rays", 4 * pixels), count: gpu.buffer("ray_count", 4) }
+        Self { list: gpu.buffer("active_rays", 4 * pixels), count: gpu.buffer("ray_count", 4), span: gpu.buffer("cloud_span", 8 * pixels) }
+    }
+
+    pub fn bindings(&self) -> Bindings<'_> {
+        vec![
+            ("active_rays", (&self.list).into()),
+            ("ray_count", (&self.count).into()),
+            ("cloud_span", (&self.span).into()),
+        ]
     }
 
     /// Begins with the lattice, of which the last column and row are a part. Returns how many pixels it has.
@@ -44,8 +54,7 @@ pub(crate) fn run(
     refined: &Refined,
     out: &Marched,
 ) -> Result<()> {
-    let ours = [("active_rays", (&refined.list).into()), ("ray_count", (&refined.count).into())];
-    let bindings = [scene.bindings.as_slice(), &out.bindings(), &ours].concat();
+    let bindings = [scene.bindings.as_slice(), &out.bindings(), &refined.bindings()].concat();
     let half = frame.stride / 2;
     let [width, height] = [frame.width, frame.sheet_rows].map(|size| (size - 1).div_ceil(half) + 1);
     work.clear(&refined.count);

@@ -1,72 +1,100 @@
 // Which pixels need rays of their own: pixels between marched ones that look alike are interpolated.
 //
-// A lattice of pixels `frame.stride` apart, and the last column and row, are known. This halves the distance: each pixel
-// that the finer lattice adds is put on the list of rays, or gets its value here.
+// A lattice of pixels `frame.stride` apart, with the last column and row, is known. This halves the distance: each pixel
+// that the finer lattice adds is put on the list of rays, or gets its value here. An invocation has a square of the
+// lattice: the pixel in its middle, and those of its upper and its left edge, which it shares with its neighbours.
 #import bindings
 
 @compute @workgroup_size(8, 8)
 fn refine(@builtin(global_invocation_id) id: vec3u) {
-    let half = frame.stride / 2u;
     let last = vec2u(frame.width, frame.sheet_rows) - 1u;
-    let pixel = min(id.xy * half, last);
-    let is_new = (pixel % frame.stride != vec2u(0u)) & (pixel != last);
-    let is_twin = id.xy > (last + half - 1u) / half;
-    if any(is_twin) || !any(is_new) {
+    if any(id.xy > (last + frame.stride - 1u) / frame.stride) {
         return;
     }
-    // Between which known columns and rows it lies.
-    let low = select(pixel, pixel - half, is_new);
-    let high = select(pixel, min(pixel + half, last), is_new);
-
-    // The corners of the squares that it lies in: one, or on an edge between two both.
-    let before = select(previous(pixel), low, is_new);
-    let after = select(min(pixel + frame.stride, last), high, is_new);
-    var least = vec2f(1e30);
-    var most = vec2f(0.0);
-    var span = vec2f(1e30, 0.0);
-    for (var i = 0u; i < 9u; i++) {
-        let corner = array<vec2u, 3>(before, select(pixel, low, is_new), after);
-        let at = index_of(vec2u(corner[i % 3u].x, corner[i / 3u].y));
-        let value = clouds[at];
-        span = vec2f(min(span.x, cloud_span[at].x), max(span.y, cloud_span[at].y));
-        let brightness = vec2f(max(max(value.r, value.g), value.b), value.a);
-        least = min(least, brightness);
-        most = max(most, brightness);
+    let half = frame.stride / 2u;
+    let low = min(id.xy * frame.stride, last);
+    let high = min(low + frame.stride, last);
+    let middle = low + half;
+    let has = middle < high; // room for a pixel between the columns, between the rows
+    if !any(has) {
+        return;
     }
-    // Light counts by what it is seen against: that of the brightest corner, or of the sky behind it.
-    let backdrop = sky_light[0].rgb;
-    let against = max(most.x, most.y * max(max(backdrop.r, backdrop.g), backdrop.b));
-    let contrast = max(most.y - least.y, (most.x - least.x) / max(against, 1e-30));
-    let index = index_of(pixel);
-    cloud_span[index] = span;
+    // Of the squares above and to the left; on the rim the square itself again.
+    let before = select(low - frame.stride, low, low < vec2u(frame.stride));
+
+    let a = read(low);
+    let b = read(vec2u(high.x, low.y));
+    let c = read(vec2u(low.x, high.y));
+    let d = read(high);
+    let own = joined(joined(looks(a), looks(b)), joined(looks(c), looks(d)));
+    let above = joined(looks(read(vec2u(low.x, before.y))), looks(read(vec2u(high.x, before.y))));
+    let left = joined(looks(read(vec2u(before.x, low.y))), looks(read(vec2u(before.x, high.y))));
+    let share = vec2f(middle - low) / vec2f(max(high - low, vec2u(1u)));
+    if has.x {
+        settle(vec2u(middle.x, low.y), joined(own, above), mixed(a, b, share.x));
+    }
+    if has.y {
+        settle(vec2u(low.x, middle.y), joined(own, left), mixed(a, c, share.y));
+    }
+    if all(has) {
+        settle(middle, own, mixed(mixed(a, b, share.x), mixed(c, d, share.x), share.y));
+    }
+}
+
+// What is known of a pixel.
+struct Known {
+    value: vec4f, // as `clouds`
+    distance: vec2f, // opacity times depth, opacity
+    span: vec2f,
+}
+
+fn read(pixel: vec2u) -> Known {
+    let index = pixel.y * frame.width + pixel.x;
+    let value = clouds[index];
+    let depth = cloud_depth[index];
+    let opacity = select(0.0, max(1.0 - value.a, 1e-6), depth >= 0.0);
+    return Known(value, opacity * vec2f(depth, 1.0), cloud_span[index]);
+}
+
+fn mixed(a: Known, b: Known, share: f32) -> Known {
+    return Known(mix(a.value, b.value, share), mix(a.distance, b.distance, share), vec2f(0.0));
+}
+
+// How the corners of squares look: least and most light, least and most transmittance, and where the clouds are.
+struct Looks {
+    light: vec2f,
+    transmittance: vec2f,
+    span: vec2f,
+}
+
+fn looks(k: Known) -> Looks {
+    return Looks(vec2f(max(max(k.value.r, k.value.g), k.value.b)), k.value.aa, k.span);
+}
+
+fn joined(a: Looks, b: Looks) -> Looks {
+    return Looks(
+        vec2f(min(a.light.x, b.light.x), max(a.light.y, b.light.y)),
+        vec2f(min(a.transmittance.x, b.transmittance.x), max(a.transmittance.y, b.transmittance.y)),
+        vec2f(min(a.span.x, b.span.x), max(a.span.y, b.span.y)),
+    );
+}
+
+fn settle(pixel: vec2u, around: Looks, between: Known) {
+    let index = pixel.y * frame.width + pixel.x;
+    cloud_span[index] = around.span;
+    // Light counts by what it is seen against: the brightest corner, or the sky behind it.
+    let backdrop = max(max(sky_light[0].r, sky_light[0].g), sky_light[0].b);
+    let against = max(around.light.y, around.transmittance.y * backdrop);
+    let contrast = max(
+        around.transmittance.y - around.transmittance.x,
+        (around.light.y - around.light.x) / max(against, 1e-30),
+    );
     if contrast > quality.contrast {
         active_rays[atomicAdd(&ray_count, 1u)] = index;
-        return;
+    } else {
+        let distance = between.distance;
+        clouds[index] = between.value;
+        cloud_depth[index] = select(-1.0, distance.x / distance.y, distance.y > 0.0);
+        samples[index] = 0u;
     }
-
-    let share = select(vec2f(0.0), vec2f(pixel - low) / vec2f(max(high - low, vec2u(1u))), is_new);
-    var value = vec4f(0.0);
-    var distance = vec2f(0.0); // weighted by opacity, and the weight
-    for (var i = 0u; i < 4u; i++) {
-        let is_high = vec2u(i % 2u, i / 2u) == vec2u(1u);
-        let corner = index_of(select(low, high, is_high));
-        let weights = select(1.0 - share, share, is_high);
-        let weight = weights.x * weights.y;
-        value += weight * clouds[corner];
-        let opacity = select(0.0, weight * max(1.0 - clouds[corner].a, 1e-6), cloud_depth[corner] >= 0.0);
-        distance += opacity * vec2f(cloud_depth[corner], 1.0);
-    }
-    clouds[index] = value;
-    cloud_depth[index] = select(-1.0, distance.x / distance.y, distance.y > 0.0);
-    samples[index] = 0u;
-}
-
-// The lattice's column and row before those of a pixel of it.
-fn previous(pixel: vec2u) -> vec2u {
-    let beyond = pixel % frame.stride;
-    return pixel - min(pixel, select(beyond, vec2u(frame.stride), beyond == vec2u(0u)));
-}
-
-fn index_of(pixel: vec2u) -> u32 {
-    return pixel.y * frame.width + pixel.x;
 }

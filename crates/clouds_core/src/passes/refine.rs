@@ -55,8 +55,7 @@ pub(crate) fn run(
     out: &Marched,
 ) -> Result<()> {
     let bindings = [scene.bindings.as_slice(), &out.bindings(), &refined.bindings()].concat();
-    let half = frame.stride / 2;
-    let [width, height] = [frame.width, frame.sheet_rows].map(|size| (size - 1).div_ceil(half) + 1);
+    let [width, height] = [frame.width, frame.sheet_rows].map(|size| (size - 1).div_ceil(frame.stride) + 1);
     work.clear(&refined.count);
     work.dispatch(&*gpu.kernel("refine", "refine", scene.variant)?, &bindings, [width, height, 1])
 }

@@ -18,7 +18,7 @@ params! {
         first_row: u32 = 0;
         /// Rows of this band.
         rows: u32 = 1;
-        /// First row that the buffers hold: where this sheet of the picture begins.
+        /// First row that the buffers hold: where this sheet begins (of the marched rows, in `march`).
         sheet_row: u32 = 0;
         /// Rows that they hold.
         sheet_rows: u32 = 1;
@@ -30,6 +30,8 @@ params! {
         subpixel_y: u32 = 0;
         /// Pixels marched in a row.
         march_width: u32 = 1;
+        /// Every how many of those a ray is known, in both directions (passes/refine).
+        lattice: u32 = 1;
         /// 1 to put the clouds before the sky, 0 to return them alone.
         background: u32 = 1;
         /// 1 when anything but the jitter differs from the frame before.

@@ -297,24 +297,20 @@ impl Renderer {
         frame.jitter_shift = (f64::from(round) * 0.618_033_988_749_895).fract() as f32;
         let scene = world.run(gpu, params, &frame, quality, timings, interrupt)?;
 
+        let mut ctx = Context { gpu, uniforms: scene.uniforms, variant: scene.variant, timings, interrupt };
+        let Animation { refined, fresh, before, now, .. } = &*animation;
         if last.is_none() {
-            let mut ctx = Context { gpu, uniforms: scene.uniforms, variant: scene.variant, timings, interrupt };
             frame.sheet_rows = height;
-            let Animation { refined, now, .. } = &*animation;
             march_sheet(&mut ctx, &scene, &mut frame, quality, &mut self.march_pace, refined, &now.marched)?;
             gpu.queue.write_buffer(&animation.now.known, 0, bytemuck::cast_slice(&vec![1u32; pixels as usize]));
         } else {
             frame.stride = STRIDE;
             [frame.subpixel_x, frame.subpixel_y] = ORDER[index as usize % 16];
             frame.march_width = cells[0];
-            in_bands(&mut self.march_pace, gpu, &scene, &mut frame, cells, |frame| {
-                let mut work = gpu.work();
-                march::run(gpu, &mut work, &scene, frame, &animation.fresh)?;
-                work.submit(timings, interrupt).map(drop)
-            })?;
+            frame.sheet_rows = cells[1];
+            march_sheet(&mut ctx, &scene, &mut frame, quality, &mut self.march_pace, refined, fresh)?;
             in_bands(&mut self.pixel_pace, gpu, &scene, &mut frame, [width, height], |frame| {
                 let mut work = gpu.work();
-                let Animation { fresh, before, now, .. } = &*animation;
                 reproject::run(gpu, &mut work, &scene, frame, fresh, before, now)?;
                 work.submit(timings, interrupt).map(drop)
             })?;
@@ -604,7 +600,7 @@ fn march_sheet(
 ) -> Result<()> {
     let (gpu, interrupt) = (ctx.gpu, ctx.interrupt);
     if quality.contrast == 0.0 {
-        let size = [frame.width, frame.sheet_row + frame.sheet_rows];
+        let size = [frame.march_width, frame.sheet_row + frame.sheet_rows];
         return in_bands(pace, gpu, scene, frame, size, |frame| {
             let mut work = gpu.work();
             march::run(gpu, &mut work, scene, frame, out)?;
@@ -612,7 +608,7 @@ fn march_sheet(
         });
     }
     let mut frame = frame.clone();
-    frame.stride = COARSEST;
+    frame.lattice = COARSEST;
     let mut rays = refined.begin(gpu, &frame);
     loop {
         frame.first_ray = 0;
@@ -626,7 +622,7 @@ fn march_sheet(
             pace.learn(u64::from(frame.active_rays), started);
             frame.first_ray += frame.active_rays;
         }
-        if frame.stride == 1 {
+        if frame.lattice == 1 {
             return Ok(());
         }
         scene.uniforms.upload_frame(gpu, &frame);
@@ -634,7 +630,7 @@ fn march_sheet(
         refine::run(gpu, &mut work, scene, &frame, refined, out)?;
         work.download(&refined.count, 0, 4);
         rays = work.submit(ctx.timings, interrupt)?[0].numbers()[0];
-        frame.stride /= 2;
+        frame.lattice /= 2;
     }
 }
 

@@ -13,11 +13,7 @@ fn march(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= frame.march_width || id.y >= frame.rows {
         return;
     }
-    let cell = vec2u(id.x, frame.first_row + id.y);
-    // The last cells of a subset may hang over the edge; they march the edge.
-    let pixel = min(cell * frame.stride + vec2u(frame.subpixel_x, frame.subpixel_y), vec2u(frame.width, frame.height) - 1u);
-    let index = (cell.y - frame.sheet_row) * frame.march_width + id.x;
-    march_pixel(pixel, index, EVERYWHERE);
+    march_cell((frame.first_row - frame.sheet_row + id.y) * frame.march_width + id.x, EVERYWHERE);
 }
 
 // Marches the pixels of a list (passes/refine).
@@ -27,17 +23,19 @@ fn march_list(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let index = active_rays[frame.first_ray + id.x];
-    let pixel = vec2u(index % frame.width, frame.sheet_row + index / frame.width);
     // Rays of the coarsest lattice look everywhere, later ones where their neighbours have found cloud.
-    let known = select(cloud_span[index], EVERYWHERE, frame.stride == COARSEST);
-    cloud_span[index] = march_pixel(pixel, index, known);
+    let known = select(cloud_span[index], EVERYWHERE, frame.lattice == COARSEST);
+    cloud_span[index] = march_cell(index, known);
 }
 
 const EVERYWHERE = vec2f(0.0, 1e30);
 const NOWHERE = vec2f(1e30, 0.0);
 
-// Marches a pixel's ray within a span, and returns the span of its clouds.
-fn march_pixel(pixel: vec2u, index: u32, within: vec2f) -> vec2f {
+// Marches the ray of a cell of the sheet within a span, and returns the span of its clouds.
+fn march_cell(index: u32, within: vec2f) -> vec2f {
+    let cell = vec2u(index % frame.march_width, frame.sheet_row + index / frame.march_width);
+    // The last cells of a subset may hang over the edge; they march the edge.
+    let pixel = min(cell * frame.stride + vec2u(frame.subpixel_x, frame.subpixel_y), vec2u(frame.width, frame.height) - 1u);
     let view = view_direction(vec2f(pixel) + 0.5);
     var cloud = Cloud(vec3f(0.0), 1.0, -1.0, NOWHERE);
     if view.w > 0.0 {

@@ -1,26 +1,26 @@
 // Which pixels need rays of their own: pixels between marched ones that look alike are interpolated.
 //
-// A lattice of pixels `frame.stride` apart, with the last column and row, is known. This halves the distance: each pixel
+// A lattice of pixels `frame.lattice` apart, with the last column and row, is known. This halves the distance: each pixel
 // that the finer lattice adds is put on the list of rays, or gets its value here. An invocation has a square of the
 // lattice: the pixel in its middle, and those of its upper and its left edge, which it shares with its neighbours.
 #import bindings
 
 @compute @workgroup_size(8, 8)
 fn refine(@builtin(global_invocation_id) id: vec3u) {
-    let last = vec2u(frame.width, frame.sheet_rows) - 1u;
-    if any(id.xy > (last + frame.stride - 1u) / frame.stride) {
+    let last = vec2u(frame.march_width, frame.sheet_rows) - 1u;
+    if any(id.xy > (last + frame.lattice - 1u) / frame.lattice) {
         return;
     }
-    let half = frame.stride / 2u;
-    let low = min(id.xy * frame.stride, last);
-    let high = min(low + frame.stride, last);
+    let half = frame.lattice / 2u;
+    let low = min(id.xy * frame.lattice, last);
+    let high = min(low + frame.lattice, last);
     let middle = low + half;
     let has = middle < high; // room for a pixel between the columns, between the rows
     if !any(has) {
         return;
     }
     // Of the squares above and to the left; on the rim the square itself again.
-    let before = select(low - frame.stride, low, low < vec2u(frame.stride));
+    let before = select(low - frame.lattice, low, low < vec2u(frame.lattice));
 
     let a = read(low);
     let b = read(vec2u(high.x, low.y));
@@ -49,7 +49,7 @@ struct Known {
 }
 
 fn read(pixel: vec2u) -> Known {
-    let index = pixel.y * frame.width + pixel.x;
+    let index = pixel.y * frame.march_width + pixel.x;
     let value = clouds[index];
     let depth = cloud_depth[index];
     let opacity = select(0.0, max(1.0 - value.a, 1e-6), depth >= 0.0);
@@ -80,7 +80,7 @@ fn joined(a: Looks, b: Looks) -> Looks {
 }
 
 fn settle(pixel: vec2u, around: Looks, between: Known) {
-    let index = pixel.y * frame.width + pixel.x;
+    let index = pixel.y * frame.march_width + pixel.x;
     cloud_span[index] = around.span;
     // Light counts by what it is seen against: the brightest corner, or the sky behind it.
     let backdrop = max(max(sky_light[0].r, sky_light[0].g), sky_light[0].b);

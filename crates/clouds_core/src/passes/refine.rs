@@ -39,13 +39,13 @@ impl Refined {
             (0..last).step_by(COARSEST as usize).chain([last])
         };
         let lattice: Vec<u32> =
-            along(frame.sheet_rows).flat_map(|y| along(frame.width).map(move |x| y * frame.width + x)).collect();
+            along(frame.sheet_rows).flat_map(|y| along(frame.march_width).map(move |x| y * frame.march_width + x)).collect();
         gpu.queue.write_buffer(&self.list, 0, bytemuck::cast_slice(&lattice));
         lattice.len() as u32
     }
 }
 
-/// Halves the distance `frame.stride` of the lattice: interpolates `out`, or lists pixels to be marched.
+/// Halves the distance `frame.lattice` of the lattice: interpolates `out`, or lists pixels to be marched.
 pub(crate) fn run(
     gpu: &Gpu,
     work: &mut Work<'_>,
@@ -55,7 +55,7 @@ pub(crate) fn run(
     out: &Marched,
 ) -> Result<()> {
     let bindings = [scene.bindings.as_slice(), &out.bindings(), &refined.bindings()].concat();
-    let [width, height] = [frame.width, frame.sheet_rows].map(|size| (size - 1).div_ceil(frame.stride) + 1);
+    let [width, height] = [frame.march_width, frame.sheet_rows].map(|size| (size - 1).div_ceil(frame.lattice) + 1);
     work.clear(&refined.count);
     work.dispatch(&*gpu.kernel("refine", "refine", scene.variant)?, &bindings, [width, height, 1])
 }

@@ -326,6 +326,10 @@ class Quality(Block):
         whole number from 1 to 4096.
     light_steps : int
         Light samples toward the sun, besides the far one. Allowed: a whole number from 1 to 128.
+    sun_volume : bool
+        Whether the light samples stay within two cells of a volume, baked around the eye, of
+        sunlight through the clouds, and the rest is read there. Not in a grid. Allowed: True or
+        False.
     light_distance : float
         How far the light samples reach; 0 spreads them to where the clouds end. Allowed: a number
         from 0 to 100000 m.
@@ -367,6 +371,7 @@ class Quality(Block):
     big_step: int = 3
     empty_samples: int = 6
     light_steps: int = 8
+    sun_volume: bool = False
     light_distance: float = 0.0
     far_sample: bool = False
     cone: float = 0.0

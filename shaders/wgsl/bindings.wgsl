@@ -6,6 +6,7 @@
 override MODEL: u32 = 0u; // light.model
 override VOLUME: bool = false; // the clouds are the user's grid, not procedural
 override PRECISE: bool = false; // that grid is read by loads and in f32, not filtered by the hardware in half floats
+override SUN_VOLUME: bool = false; // light from beyond the light samples is read from the sun volume
 override LIGHT_DETAIL: bool = true; // there are light samples that see the detail
 override LIGHT_CHEAP: bool = true; // there are light samples that do not
 
@@ -28,6 +29,7 @@ override LIGHT_CHEAP: bool = true; // there are light samples that do not
 @group(0) @binding(30) var volume: texture_3d<f32>; // the user's grid, 1 at its largest extinction, in half floats
 @group(0) @binding(31) var volume_exact: texture_3d<f32>; // the same in f32, which cannot be filtered everywhere
 @group(0) @binding(32) var majorants: texture_3d<f32>; // what the density nearby never exceeds (passes/majorant)
+@group(0) @binding(40) var sun_volume: texture_3d<f32>; // exp(-rate * optical depth to the sun) (passes/sun_volume)
 
 // One entry a pixel, row by row.
 @group(0) @binding(12) var<storage, read_write> clouds: array<vec4f>; // premultiplied radiance, transmittance

@@ -3,6 +3,7 @@
 #import phase
 #import shell
 #import density
+#import sun_volume
 
 // Six directions spread over the unit sphere for the cone of light samples (nubis2015's noise kernel).
 const CONE = array<vec3f, 6>(
@@ -34,8 +35,15 @@ fn optical_depth_to_sun(p: vec3f, opacity: f32, width: f32) -> f32 {
             depth += cloud_density_cheap(at.p, at.altitude, at.width) * at.length;
         }
     }
-    return depth * frame.extinction;
+    depth *= frame.extinction;
+    if SUN_VOLUME {
+        depth += sun_volume_depth(p + samples.reach * frame.sun_direction, level_at(p.xy));
+    }
+    return depth;
 }
+
+// Cells of the sun volume that are sampled live: it does not know what is nearer.
+const NEAR_CELLS = 2.0;
 
 // Where the samples lie: by squares over a given reach (the stretch of the k-th of n begins at (k / n)^2 of it), or to the
 // end of the clouds, where log(1 + distance / NEAR) grows in equal steps.
@@ -48,6 +56,9 @@ struct LightSamples {
 const NEAR = 150.0;
 
 fn light_samples(p: vec3f) -> LightSamples {
+    if SUN_VOLUME {
+        return LightSamples(NEAR_CELLS * level_cell(level_at(p.xy)), 0.0);
+    }
     if quality.light_distance > 0.0 {
         return LightSamples(quality.light_distance, 0.0);
     }

@@ -6,6 +6,7 @@ use glam::{DVec2, DVec3};
 use crate::camera::{Camera, Projection};
 use crate::params;
 use crate::params::Params;
+use crate::passes::sun_volume;
 
 params! {
     /// What the renderer knows about a frame.
@@ -108,6 +109,9 @@ params! {
         /// The shortest side of a voxel, m.
         voxel: f32 = 0.0;
 
+        /// Where the eye is in the sun volume, after the wind, m from its middle (sun_volume.wgsl).
+        sun_volume_eye: [f32; 2] = [0.0; 2];
+
         /// Unit vector toward the sun.
         sun_direction: [f32; 3] = [0.0, 0.0, 1.0];
         /// Unit vector toward which the wind blows.
@@ -170,6 +174,15 @@ fn wrap(v: f64, period: f32) -> f32 {
     if fraction < 1.0 { fraction } else { 0.0 }
 }
 
+/// How far the clouds drift in a time, m. What the eye follows is the silhouette: it drifts with the weather, and its
+/// billows with the base shape.
+pub(crate) fn drift(params: &Params, elapsed: f64) -> DVec3 {
+    let wind = &params.wind;
+    let weather = compass(f64::from(wind.weather_direction)) * f64::from(wind.weather_speed);
+    let shape = compass(f64::from(wind.direction)) * f64::from(wind.speed);
+    ((weather + shape) * 0.5).extend(0.5 * f64::from(wind.updraft)) * elapsed
+}
+
 impl Frame {
     /// The frame of a picture of `size` pixels seen by `camera` at `time` seconds.
     pub fn new(camera: &Camera, params: &Params, time: f64, size: [u32; 2]) -> Self {
@@ -179,6 +192,7 @@ impl Frame {
         frame.set_planet(camera.eye, params);
         frame.set_wind(camera.eye, params, time);
         frame.set_volume(camera.eye, params);
+        frame.sun_volume_eye = sun_volume::eye_in(camera.eye, params, time);
         frame.sun_direction = sun_direction(params).as_vec3().to_array();
         frame
     }
@@ -272,12 +286,6 @@ impl Frame {
         self.previous_tan_half_fov = previous.tan_half_fov;
         self.previous_half_fov = previous.half_fov;
         self.eye_motion = eye_motion.as_vec3().to_array();
-        // What the eye follows is the silhouette: it drifts with the weather, and its billows with the base shape.
-        let wind = &params.wind;
-        let weather = compass(f64::from(wind.weather_direction)) * f64::from(wind.weather_speed);
-        let shape = compass(f64::from(wind.direction)) * f64::from(wind.speed);
-        let rise = f64::from(wind.updraft);
-        self.cloud_motion =
-            ((weather + shape) * 0.5).extend(0.5 * rise).as_vec3().map(|v| v * elapsed as f32).to_array();
+        self.cloud_motion = drift(params, elapsed).as_vec3().to_array();
     }
 }

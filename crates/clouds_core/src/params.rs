@@ -207,6 +207,9 @@ params! {
         empty_samples: u32 = 6, in 1..=4096 "";
         /// Light samples toward the sun, besides the far one.
         light_steps: u32 = 8, in 1..=128 "";
+        /// Whether the light samples stay within two cells of a volume, baked around the eye, of sunlight through the clouds,
+        /// and the rest is read there. Not in a grid.
+        sun_volume: bool = false;
         /// How far the light samples reach; 0 spreads them to where the clouds end.
         light_distance: f32 = 0.0, in 0..=100000 "m";
         /// Whether there is one more light sample, at three times that reach, for shadows from distant clouds (nubis2015).

@@ -23,6 +23,7 @@ use crate::passes::rays::Rays;
 use crate::passes::refine::{COARSEST, Refined};
 use crate::passes::reproject::{History, ORDER, STRIDE};
 use crate::passes::sky::Sky;
+use crate::passes::sun_volume::SunVolume;
 use crate::passes::volume::Volume;
 use crate::passes::weather::Weather;
 use crate::passes::{Bindings, Context, Scene, Uniforms, composite, march, path, points, reference, refine, reproject};
@@ -189,7 +190,7 @@ impl Renderer {
         frame.first_sample = first_sample;
         let method = Method::new(params, &self.quality);
         let Self { gpu, world, quality, timings, .. } = self;
-        let scene = world.run(gpu, params, &frame, quality, timings, interrupt)?;
+        let scene = world.run(gpu, params, &frame, (camera.eye, time), quality, timings, interrupt)?;
 
         let [width, height] = self.size;
         let mut picture = Picture::default();
@@ -295,7 +296,7 @@ impl Renderer {
         // shot keeps the still's, and so becomes the still.
         let round = if frame.moving > 0 { index / 16 } else { 0 };
         frame.jitter_shift = (f64::from(round) * 0.618_033_988_749_895).fract() as f32;
-        let scene = world.run(gpu, params, &frame, quality, timings, interrupt)?;
+        let scene = world.run(gpu, params, &frame, (camera.eye, time), quality, timings, interrupt)?;
 
         let mut ctx = Context { gpu, uniforms: scene.uniforms, variant: scene.variant, timings, interrupt };
         let Animation { refined, fresh, before, now, .. } = &*animation;
@@ -456,7 +457,7 @@ impl Renderer {
     ) -> Result<Vec<[f32; 4]>> {
         let frame = self.begin(camera, params, time)?;
         let Self { gpu, world, quality, timings, .. } = self;
-        let scene = world.run(gpu, params, &frame, quality, timings, interrupt)?;
+        let scene = world.run(gpu, params, &frame, (camera.eye, time), quality, timings, interrupt)?;
         let mut ctx = Context { gpu, uniforms: scene.uniforms, variant: scene.variant, timings, interrupt };
         points::run(&mut ctx, &scene, &frame, kernel, points)
     }
@@ -483,6 +484,7 @@ struct World {
     sky: Sky,
     volume: Volume,
     majorants: Majorants,
+    sun_volume: SunVolume,
 }
 
 impl World {
@@ -500,6 +502,7 @@ impl World {
             sky: Sky::new(),
             volume: Volume::new(),
             majorants: Majorants::new(),
+            sun_volume: SunVolume::new(),
         }
     }
 
@@ -509,6 +512,7 @@ impl World {
         gpu: &Gpu,
         params: &Params,
         frame: &Frame,
+        at: (DVec3, f64),
         quality: &Quality,
         timings: &mut Timings,
         interrupt: Interrupt<'_>,
@@ -530,6 +534,8 @@ impl World {
             [uniforms, noise.bindings(), weather, high_clouds, sky, volume, blue_noise].concat();
         let majorants = self.majorants.run(&mut ctx, params, &bindings)?; // when paths are traced
         bindings.extend(majorants);
+        let sun_volume = self.sun_volume.run(&mut ctx, params, frame, at, &bindings)?; // as clouds and eye move
+        bindings.extend(sun_volume);
         Ok(Scene { uniforms: &self.uniforms, variant, bindings })
     }
 }

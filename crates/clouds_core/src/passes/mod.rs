@@ -12,6 +12,7 @@ pub mod reference;
 pub mod refine;
 pub mod reproject;
 pub mod sky;
+pub mod sun_volume;
 pub mod volume;
 pub mod weather;
 

@@ -1,0 +1,68 @@
+// Bakes the optical depth to the sun around the eye, which stands in the middle: first the density of each cell, then the
+// light from those.
+#import bindings
+#import density
+#import shell
+#import sun_volume
+
+// Points that a cell's density is the mean of, beyond the finest level.
+const POINTS = 4u;
+// Samples toward the sun.
+const SAMPLES = 12u;
+
+@compute @workgroup_size(8, 8)
+fn sun_volume_density(@builtin(global_invocation_id) id: vec3u) {
+    if any(id >= vec3u(SIDE, SIDE, LEVELS * ROWS)) {
+        return;
+    }
+    let level = id.z / ROWS;
+    let cell = level_cell(level);
+    let corner = vec3f(vec2f(id.xy) - 0.5 * f32(SIDE), f32(id.z % ROWS));
+    let count = select(POINTS, 1u, level == 0u);
+    var density = 0.0;
+    for (var i = 0u; i < count; i++) {
+        // A low-discrepancy sequence (R3) that begins in the middle.
+        let at = corner + fract(0.5 + f32(i) * vec3f(0.8191725, 0.6710436, 0.5497004));
+        let altitude = mix(params.clouds.base, params.clouds.top, at.z / f32(ROWS));
+        density += cloud_density_cheap(vec3f(cell * at.xy, 0.0), altitude, min(cell, 100.0));
+    }
+    textureStore(volume_out, id, vec4f(density / f32(count)));
+}
+
+@compute @workgroup_size(8, 8)
+fn sun_volume_light(@builtin(global_invocation_id) id: vec3u) {
+    if any(id >= vec3u(SIDE, SIDE, LEVELS * ROWS)) {
+        return;
+    }
+    let level = id.z / ROWS;
+    let cell = level_cell(level);
+    let xy = cell * (vec2f(id.xy) + 0.5 - 0.5 * f32(SIDE));
+    let altitude = mix(params.clouds.base, params.clouds.top, (f32(id.z % ROWS) + 0.5) / f32(ROWS));
+    let p = place(xy, altitude);
+    let s = cloud_stretches_from(p, frame.sun_direction);
+    let whole = s.start + s.first + s.gap + s.second;
+    let rate = log2(1.0 + whole / cell) / f32(SAMPLES);
+    var depth = 0.0;
+    var begin = 0.0;
+    for (var i = 1u; i <= SAMPLES; i++) {
+        let end = cell * (exp2(rate * f32(i)) - 1.0);
+        let at = p + 0.5 * (begin + end) * frame.sun_direction;
+        let height = height_at(altitude_at(at));
+        let coarse = u32(clamp(log2((end - begin) / CELL), f32(level), f32(LEVELS - 1u)));
+        let coordinates = stack_coordinates(at.xy, height, max(coarse, level_at(at.xy)));
+        let density = textureSampleLevel(volume_in, clamp_sampler, coordinates, 0.0).r;
+        let inside = height >= 0.0 && height <= 1.0;
+        depth += select(0.0, density, inside) * (end - begin);
+        begin = end;
+    }
+    textureStore(volume_out, id, exp(-frame.extinction * depth * RATES));
+}
+
+// The point at an altitude above, or below, a place beside the eye.
+fn place(xy: vec2f, altitude: f32) -> vec3f {
+    let centre = frame.zenith * frame.centre_distance;
+    let across = length(centre.xy + xy);
+    let r = params.atmosphere.planet_radius + altitude;
+    let up = sqrt(max((r - across) * (r + across), 0.0));
+    return vec3f(xy, select(-up, up, centre.z >= 0.0) - centre.z);
+}

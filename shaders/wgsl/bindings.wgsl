@@ -6,6 +6,7 @@
 override MODEL: u32 = 0u; // light.model
 override VOLUME: bool = false; // the clouds are the user's grid, not procedural
 override PRECISE: bool = false; // that grid is read by loads and in f32, not filtered by the hardware in half floats
+override SUNLIT: bool = true; // the sun can reach the clouds
 override SUN_VOLUME: bool = false; // light from beyond the light samples is read from the sun volume
 override LIGHT_DETAIL: bool = true; // there are light samples that see the detail
 override LIGHT_CHEAP: bool = true; // there are light samples that do not

@@ -1,7 +1,7 @@
 //! What the renderer knows about a frame and its user does not set: the `frame` uniform. Everything that would lose
 //! its digits in f32 (planet radii, long times, distant eyes) is worked out here in f64.
 
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, Vec3};
 
 use crate::camera::{Camera, Projection};
 use crate::params;
@@ -195,6 +195,16 @@ impl Frame {
         frame.sun_volume_eye = sun_volume::eye_in(camera.eye, params, time);
         frame.sun_direction = sun_direction(params).as_vec3().to_array();
         frame
+    }
+
+    /// Whether the sun can reach the clouds: false only where `sky_light` is none (passes/sky.wgsl, atmosphere.wgsl).
+    pub fn sunlit(&self, params: &Params) -> bool {
+        let height = f64::from(0.5 * (params.clouds.base + params.clouds.top));
+        let radius = f64::from(params.atmosphere.planet_radius);
+        let horizon = -(1.0 - (radius / (radius + height)).powi(2)).max(0.0).sqrt();
+        let cosine = Vec3::from_array(self.zenith).dot(Vec3::from_array(self.sun_direction));
+        // The sun's half degree, and what f32 may be off.
+        f64::from(cosine) - horizon > -0.005 - 1e-5 && params.sun.irradiance != [0.0; 3]
     }
 
     fn set_camera(&mut self, camera: &Camera) {

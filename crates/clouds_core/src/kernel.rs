@@ -35,6 +35,8 @@ pub(crate) struct Variant {
     pub volume: bool,
     /// Whether that grid is read in f32.
     pub precise: bool,
+    /// Whether the sun can reach the clouds.
+    pub sunlit: bool,
     /// Whether light is read from the sun volume.
     pub sun_volume: bool,
     /// Whether there are light samples that see the detail.
@@ -51,18 +53,20 @@ impl Variant {
             model,
             volume: params.volume.is_some(),
             precise: quality.tolerance > 0.0 || model == Model::Path,
+            sunlit: true,
             sun_volume: quality.sun_volume && params.volume.is_none(),
             light_detail: quality.cheap_light > 0.0,
             light_cheap: quality.cheap_light < 1.0 || quality.far_sample,
         }
     }
 
-    fn constants(self) -> [(&'static str, f64); 6] {
+    fn constants(self) -> [(&'static str, f64); 7] {
         let switch = |on| f64::from(u8::from(on));
         [
             ("MODEL", f64::from(self.model as u32)),
             ("VOLUME", switch(self.volume)),
             ("PRECISE", switch(self.precise)),
+            ("SUNLIT", switch(self.sunlit)),
             ("SUN_VOLUME", switch(self.sun_volume)),
             ("LIGHT_DETAIL", switch(self.light_detail)),
             ("LIGHT_CHEAP", switch(self.light_cheap)),

@@ -518,7 +518,7 @@ impl World {
         interrupt: Interrupt<'_>,
     ) -> Result<Scene<'_>> {
         self.uniforms.upload(gpu, params, frame, quality);
-        let variant = Variant::new(params, quality);
+        let variant = Variant { sunlit: frame.sunlit(params), ..Variant::new(params, quality) };
         let mut ctx = Context { gpu, uniforms: &self.uniforms, variant, timings, interrupt };
 
         let noise = self.noise.insert(Noise::run(&mut ctx, params)?); // once for a seed

@@ -177,7 +177,7 @@ fn march_ray(direction: vec3f, offset: f32, within: vec2f) -> Cloud {
                 let x = density * frame.extinction * at.length;
                 let weight = transmittance * x * one_minus_exp_over(x);
                 var depth_to_sun = 0.0;
-                if sunlit {
+                if SUNLIT && sunlit {
                     depth_to_sun = optical_depth_to_sun(at.p, 1.0 - transmittance, at.width);
                 }
                 let sun = sun_scattering(depth_to_sun, column.precipitation, one_minus_mu);

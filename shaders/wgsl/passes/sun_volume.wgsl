@@ -7,8 +7,9 @@
 
 // Points that a cell's density is the mean of, beyond the finest level.
 const POINTS = 4u;
-// Samples toward the sun.
-const SAMPLES = 12u;
+// Samples toward the sun for each doubling of the distance, and most of them.
+const DENSE_SAMPLES = 3.0;
+const MOST_SAMPLES = 40.0;
 
 @compute @workgroup_size(8, 8)
 fn sun_volume_density(@builtin(global_invocation_id) id: vec3u) {
@@ -41,11 +42,13 @@ fn sun_volume_light(@builtin(global_invocation_id) id: vec3u) {
     let p = place(xy, altitude);
     let s = cloud_stretches_from(p, frame.sun_direction);
     let whole = s.start + s.first + s.gap + s.second;
-    let rate = log2(1.0 + whole / cell) / f32(SAMPLES);
+    let doublings = log2(1.0 + whole / cell);
+    let count = clamp(ceil(DENSE_SAMPLES * doublings), 1.0, MOST_SAMPLES);
+    let rate = doublings / count;
     var depth = 0.0;
     var begin = 0.0;
-    for (var i = 1u; i <= SAMPLES; i++) {
-        let end = cell * (exp2(rate * f32(i)) - 1.0);
+    for (var i = 1.0; i <= count; i += 1.0) {
+        let end = cell * (exp2(rate * i) - 1.0);
         let at = p + 0.5 * (begin + end) * frame.sun_direction;
         let height = height_at(altitude_at(at));
         let coarse = u32(clamp(log2((end - begin) / CELL), f32(level), f32(LEVELS - 1u)));

@@ -1,7 +1,8 @@
 //! The frame, top to bottom.
 
 use std::mem;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
+use std::thread;
 use std::time::Instant;
 
 use glam::DVec3;
@@ -126,7 +127,11 @@ impl Renderer {
                 return Err(Error::parameter(name, value, "a whole number from 1 to 65536 pixels"));
             }
         }
-        let gpu = Gpu::open(adapter)?;
+        // Each takes a process's first renderer some 20 ms of one thread.
+        let gpu = thread::scope(|scope| {
+            scope.spawn(|| LazyLock::force(&blue_noise::TILE));
+            Gpu::open(adapter)
+        })?;
         let pace = Pace::new(if gpu.info.kind == "cpu" { 3e5 } else { 1e8 });
         Ok(Self {
             world: World::new(&gpu),
@@ -486,7 +491,7 @@ impl World {
     fn new(gpu: &Gpu) -> Self {
         let side = blue_noise::SIZE as u32;
         let texture = gpu.texture("blue_noise", [side, side, 1], 1);
-        let texels: Vec<_> = blue_noise::tile().iter().map(|v| [half::f16::from_f32(*v); 4]).collect();
+        let texels: Vec<_> = blue_noise::TILE.iter().map(|v| [half::f16::from_f32(*v); 4]).collect();
         gpu.write_texture(&texture, &texels);
         Self {
             uniforms: Uniforms::new(gpu),

@@ -69,7 +69,20 @@ enum Method {
     Path,
 }
 
+/// The kernels of the bakes that are kept from no earlier process.
+const BAKES: [(&str, &str); 3] = [("high_clouds", "high_clouds"), ("sky", "sky_map_bake"), ("sky", "sky_light_bake")];
+
 impl Method {
+    /// The kernels of a still.
+    fn kernels(self) -> Vec<(&'static str, &'static str)> {
+        let clouds = match self {
+            Self::March => ("march", "march"),
+            Self::Reference => ("reference", "reference"),
+            Self::Path => ("path", "path"),
+        };
+        [&BAKES[..], &[clouds, ("composite", "composite")]].concat()
+    }
+
     fn new(params: &Params, quality: &Quality) -> Self {
         match params.light.model {
             Model::Path => Self::Path,
@@ -190,7 +203,9 @@ impl Renderer {
         frame.first_sample = first_sample;
         let method = Method::new(params, &self.quality);
         let Self { gpu, world, quality, timings, .. } = self;
-        let scene = world.run(gpu, params, &frame, quality, timings, interrupt)?;
+        let scene = gpu.compiling(&method.kernels(), Variant::new(params, quality), || {
+            world.run(gpu, params, &frame, quality, timings, interrupt)
+        })?;
 
         let [width, height] = self.size;
         let mut picture = Picture::default();
@@ -241,6 +256,7 @@ impl Renderer {
             }
             frame.first_row += frame.rows;
         }
+        gpu.pipelines.store();
         Ok(picture)
     }
 
@@ -327,6 +343,7 @@ impl Renderer {
             Ok(())
         })?;
 
+        gpu.pipelines.store();
         mem::swap(&mut animation.before, &mut animation.now);
         animation.last = Some(Shot { camera: *camera, params: params.clone(), time, frame, index });
         Ok(image)

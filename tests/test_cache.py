@@ -58,7 +58,7 @@ def filled(_filled, tmp_path):
 
 
 def files(folder, kind):
-    return sorted(folder.glob(f"nubis-{kind}-*"))
+    return sorted(folder.glob(f"nubis-cache-{kind}-*"))
 
 
 def test_the_next_process_bakes_nothing_and_sees_the_same(filled, baked):
@@ -193,10 +193,10 @@ def test_clear_removes_what_is_ours(_filled, monkeypatch, capsys, tmp_path):
     assert folder == str(tmp_path / "cache")
     assert np.isclose(float(size.removesuffix(" MB")), 21.9, atol=0.3)
     # One of a writer that died, and one of somebody else.
-    (tmp_path / "cache" / "nubis-noise-x1y2.tmp").write_bytes(b"torn")
-    (tmp_path / "cache" / "thesis.tex").write_text("mine")
+    (tmp_path / "cache" / "nubis-cache-noise-x1y2.tmp").write_bytes(b"torn")
+    (tmp_path / "cache" / "nubis-thesis.tex").write_text("mine")
     assert main(["cache", "--clear"]) == 0
-    assert [file.name for file in (tmp_path / "cache").iterdir()] == ["thesis.tex"]
-    (tmp_path / "cache" / "thesis.tex").unlink()
+    assert [file.name for file in (tmp_path / "cache").iterdir()] == ["nubis-thesis.tex"]
+    (tmp_path / "cache" / "nubis-thesis.tex").unlink()
     assert main(["cache", "--clear"]) == 0
     assert not (tmp_path / "cache").exists()

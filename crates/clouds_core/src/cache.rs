@@ -18,10 +18,12 @@ const MAGIC: &str = concat!("nubis ", env!("CARGO_PKG_VERSION"), ", format 1\n")
 /// Most files of a kind in the folder, 20 MB each where they are noise; the one that was used last longest ago goes first.
 /// A process stores no more either, so that a data set of thousands of seeds does not write all of them.
 const KEPT: usize = 8;
+/// Bytes of pipelines from which on none are loaded: they grow with each change of the shaders, and are never pruned.
+const MOST_PIPELINES: usize = 64 << 20;
 
 /// How the names of all files begin. What is done to files is done to these alone: the user may have named a folder with
 /// others in it.
-const PREFIX: &str = "nubis-";
+const PREFIX: &str = "nubis-cache-";
 
 /// The folder: what `NUBIS_CACHE` names, else `nubis` in the user's cache folder. None where `NUBIS_CACHE` is empty, `0`
 /// or `off`, or there is no such folder.
@@ -132,7 +134,7 @@ impl Pipelines {
         let same = wgpu::util::pipeline_cache_key(&adapter.get_info()).unwrap_or_default();
         let key = format!("{same} {} {}", info.name, info.driver);
         let offered = device.features().contains(wgpu::Features::PIPELINE_CACHE) && folder().is_some();
-        let stored = if offered { load("pipelines", &key) } else { None };
+        let stored = load("pipelines", &key).filter(|stored| offered && stored.len() < MOST_PIPELINES);
         let descriptor =
             wgpu::PipelineCacheDescriptor { label: Some("pipelines"), data: stored.as_deref(), fallback: true };
         // SAFETY: the data is what such a cache gave: the checksum says so, and wgpu and the driver see whether they are

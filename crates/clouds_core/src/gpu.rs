@@ -145,6 +145,7 @@ pub struct Gpu {
     /// The last noise bake: renderers of the same seed share it.
     pub(crate) noise: Mutex<Option<Arc<Noise>>>,
     kernels: Mutex<HashMap<(String, Variant), Slot>>,
+    /// What the driver has compiled.
     pub(crate) pipelines: Pipelines,
     nanoseconds_per_tick: Option<f64>,
     failure: Arc<Mutex<Failure>>,
@@ -210,6 +211,8 @@ impl Gpu {
         });
 
         let pipelines = Pipelines::new(&device, adapter, &info);
+        // Where it refuses the file, there is no cache, and nothing is wrong.
+        lock(&failure).error = None;
         let sampler = |label, address| {
             device.create_sampler(&wgpu::SamplerDescriptor {
                 label: Some(label),

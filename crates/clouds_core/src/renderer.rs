@@ -308,7 +308,9 @@ impl Renderer {
         // shot keeps the still's, and so becomes the still.
         let round = if frame.moving > 0 { index / 16 } else { 0 };
         frame.jitter_shift = (f64::from(round) * 0.618_033_988_749_895).fract() as f32;
-        let scene = world.run(gpu, params, &frame, quality, timings, interrupt)?;
+        let scene = gpu.compiling(&Method::March.kernels(), Variant::new(params, quality), || {
+            world.run(gpu, params, &frame, quality, timings, interrupt)
+        })?;
 
         if last.is_none() {
             in_bands(&mut self.march_pace, gpu, &scene, &mut frame, [width, height], |frame| {

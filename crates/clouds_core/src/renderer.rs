@@ -75,12 +75,12 @@ const BAKES: [(&str, &str); 3] = [("high_clouds", "high_clouds"), ("sky", "sky_m
 impl Method {
     /// The kernels of a still.
     fn kernels(self) -> Vec<(&'static str, &'static str)> {
-        let clouds = match self {
-            Self::March => ("march", "march"),
-            Self::Reference => ("reference", "reference"),
-            Self::Path => ("path", "path"),
+        let clouds: &[_] = match self {
+            Self::March => &[("march", "march")],
+            Self::Reference => &[("reference", "reference")],
+            Self::Path => &[("path", "path")],
         };
-        [&BAKES[..], &[clouds, ("composite", "composite")]].concat()
+        [&BAKES, clouds, &[("composite", "composite")]].concat()
     }
 
     fn new(params: &Params, quality: &Quality) -> Self {

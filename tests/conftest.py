@@ -2,12 +2,15 @@
 
 import functools
 import os
+import shutil
 import sys
+import tempfile
 
 import numpy as np
 import pytest
 
 os.environ.setdefault("NUBIS_ADAPTER", "cpu")
+os.environ["NUBIS_CACHE"] = tempfile.mkdtemp(prefix="nubis-tests-")  # not the user's own
 
 import nubis
 import nubis.testing
@@ -44,6 +47,10 @@ def renderer():
 @pytest.fixture
 def rng():
     return np.random.default_rng(20150809)
+
+
+def pytest_unconfigure():
+    shutil.rmtree(os.environ["NUBIS_CACHE"], ignore_errors=True)
 
 
 def pytest_terminal_summary(terminalreporter):

@@ -13,6 +13,7 @@ from time import perf_counter
 import numpy as np
 
 import nubis
+from nubis import _nubis
 
 _FORMATS = ("png", "exr", "hdr", "npy")
 
@@ -81,6 +82,16 @@ def _parser() -> argparse.ArgumentParser:
     render.add_argument(
         "--params", type=Path, metavar="FILE", help="TOML file of a sky in place of the scenes' own"
     )
+
+    cache = commands.add_parser(
+        "cache",
+        help="print where baked noise and compiled shaders are kept, or remove them",
+        description="Print the folder in which baked noise and compiled shaders are kept for the "
+        "next process, and its size. NUBIS_CACHE names another folder; empty, 0 or off, it keeps "
+        "nothing.",
+    )
+    cache.set_defaults(run=_cache)
+    cache.add_argument("--clear", action="store_true", help="remove what is in it")
 
     for run, name, about in [
         (_scenes, "scenes", "list the scenes"),
@@ -164,6 +175,13 @@ def _adapters(_: argparse.Namespace) -> None:
         nubis.Renderer(1, 1)  # Raises the error that says what would help.
     for index, adapter in enumerate(found):
         print(f"{index}: {_line(adapter)}")
+
+
+def _cache(args: argparse.Namespace) -> None:
+    if args.clear:
+        _nubis.clear_cache()
+    folder, size = _nubis.cache_usage()
+    print(f"{folder}: {size / 1e6:.1f} MB" if folder else "off (NUBIS_CACHE)")
 
 
 def _info(args: argparse.Namespace) -> None:

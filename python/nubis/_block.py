@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import os
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
 import numpy as np
-import tomli_w
 
 from nubis import _nubis
 from nubis._errors import ParameterError
@@ -137,6 +135,8 @@ class Root(Base):
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write all parameters to a TOML file."""
+        import tomli_w  # here, as `tomllib` below: a first picture need not wait for them
+
         tables = {
             block: {name: value for name, value in fields.items() if value is not None}
             for block, fields in self.to_dict().items()
@@ -146,6 +146,8 @@ class Root(Base):
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
         """Read parameters from a TOML file; fields left out have their defaults."""
+        import tomllib
+
         try:
             values = tomllib.loads(Path(path).read_text(encoding="utf-8"))
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:

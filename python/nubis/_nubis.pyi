@@ -1,6 +1,7 @@
 """The compiled renderer: crates/clouds_py/src/lib.rs."""
 
 from os import PathLike
+from pathlib import Path
 from typing import Any, Literal, Self, TypeAlias, final
 
 import numpy as np
@@ -13,9 +14,11 @@ __all__ = [
     "DensityGrid",
     "Renderer",
     "adapters",
+    "cache_usage",
     "check",
     "check_params",
     "check_quality",
+    "clear_cache",
     "number",
     "quality",
     "to_srgb8",
@@ -198,11 +201,15 @@ class Renderer:
     def adapter(self) -> dict[str, str]: ...
 
 def adapters() -> list[dict[str, str]]: ...
+def cache_usage() -> tuple[Path | None, int]:
+    """The folder of the cache, None where it is off, and how many bytes are in it."""
+
 def check(type_name: str, path: str, name: str, value: object) -> Any:
     """The value in the type that a field of a block holds, or `ParameterError`."""
 
 def check_params(params: object) -> None: ...
 def check_quality(quality: Quality) -> None: ...
+def clear_cache() -> None: ...
 def number(name: str, value: object) -> float:
     """The number that is given for an argument, or `ParameterError`."""
 

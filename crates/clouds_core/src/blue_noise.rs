@@ -1,5 +1,10 @@
 //! A tile of blue noise by void and cluster (Ulichney 1993): thresholds whose errors the eye forgives.
 
+use std::sync::LazyLock;
+
+/// The tile, made once in a process.
+pub static TILE: LazyLock<Vec<f32>> = LazyLock::new(tile);
+
 /// Width and height of the tile; a power of two, so that it wraps by masking.
 pub const SIZE: usize = 64;
 
@@ -55,7 +60,7 @@ impl Energy {
 }
 
 /// The rank of each point divided by their number, row by row: every value from 0 to 1 once.
-pub fn tile() -> Vec<f32> {
+fn tile() -> Vec<f32> {
     let mut energy = Energy::new();
     // A tenth of the points at pseudo-random places (a Weyl sequence), then relaxed until nothing moves.
     let count = SIZE * SIZE / 10;

@@ -1,10 +1,13 @@
 //! The GPU: finding an adapter, opening a device once per process, and waiting for it without hanging.
 
 use std::collections::HashMap;
+use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::thread;
 use std::time::{Duration, Instant};
 
+use crate::cache::Pipelines;
 use crate::error::{Error, Result};
 use crate::kernel::{Binding, Kernel, Variant};
 use crate::passes::noise::Noise;
@@ -141,10 +144,15 @@ pub struct Gpu {
     pub(crate) clamp_sampler: wgpu::Sampler,
     /// The last noise bake: renderers of the same seed share it.
     pub(crate) noise: Mutex<Option<Arc<Noise>>>,
-    kernels: Mutex<HashMap<(String, Variant), Arc<Kernel>>>,
+    kernels: Mutex<HashMap<(String, Variant), Slot>>,
+    /// What the driver has compiled.
+    pub(crate) pipelines: Pipelines,
     nanoseconds_per_tick: Option<f64>,
     failure: Arc<Mutex<Failure>>,
 }
+
+/// A kernel that is there, or is being compiled by whoever holds the lock.
+type Slot = Arc<Mutex<Option<Arc<Kernel>>>>;
 
 #[derive(Default)]
 struct Failure {
@@ -179,9 +187,10 @@ impl Gpu {
             ..wgpu::Limits::default()
         };
         let timestamps = wgpu::Features::TIMESTAMP_QUERY & adapter.features();
+        let keeps = wgpu::Features::PIPELINE_CACHE & adapter.features();
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("nubis"),
-            required_features: timestamps,
+            required_features: timestamps | keeps,
             required_limits: limits,
             ..Default::default()
         };
@@ -201,6 +210,9 @@ impl Gpu {
             failure.error = Some(format!("the device was lost ({reason:?}): {message}"));
         });
 
+        let pipelines = Pipelines::new(&device, adapter, &info);
+        // Where it refuses the file, there is no cache, and nothing is wrong.
+        lock(&failure).error = None;
         let sampler = |label, address| {
             device.create_sampler(&wgpu::SamplerDescriptor {
                 label: Some(label),
@@ -221,6 +233,7 @@ impl Gpu {
             max_buffer: offered.max_storage_buffer_binding_size.min(offered.max_buffer_size),
             noise: Mutex::new(None),
             kernels: Mutex::new(HashMap::new()),
+            pipelines,
             nanoseconds_per_tick: (!timestamps.is_empty()).then(|| f64::from(queue.get_timestamp_period())),
             failure,
             device,
@@ -230,14 +243,37 @@ impl Gpu {
 
     /// The kernel `entry` of `shaders/wgsl/passes/{pass}.wgsl`, compiled on first use.
     pub(crate) fn kernel(&self, pass: &str, entry: &str, variant: Variant) -> Result<Arc<Kernel>> {
-        let mut kernels = lock(&self.kernels);
-        let key = (entry.to_owned(), variant);
-        if let Some(kernel) = kernels.get(&key) {
+        let slot = lock(&self.kernels).entry((entry.to_owned(), variant)).or_default().clone();
+        let mut slot = lock(&slot);
+        if let Some(kernel) = &*slot {
             return Ok(kernel.clone());
         }
         let kernel = Arc::new(Kernel::new(self, pass, entry, variant)?);
-        kernels.insert(key, kernel.clone());
+        *slot = Some(kernel.clone());
         Ok(kernel)
+    }
+
+    /// Does `work` while `kernels` that it will ask for, each a pass and an entry, are compiled on other threads.
+    pub(crate) fn compiling<T>(
+        &self,
+        kernels: &[(&str, &str)],
+        variant: Variant,
+        work: impl FnOnce() -> Result<T>,
+    ) -> Result<T> {
+        let compiled = |entry: &str| {
+            let slot = lock(&self.kernels).get(&(entry.to_owned(), variant)).cloned();
+            slot.is_some_and(|slot| lock(&slot).is_some())
+        };
+        thread::scope(|scope| {
+            let missing = kernels.iter().filter(|(_, entry)| !compiled(entry));
+            let threads: Vec<_> =
+                missing.map(|(pass, entry)| scope.spawn(move || self.kernel(pass, entry, variant).map(drop))).collect();
+            let done = work()?;
+            for thread in threads {
+                thread.join().unwrap_or_else(|panic| resume_unwind(panic))?;
+            }
+            Ok(done)
+        })
     }
 
     /// The first error since the last call, if any.
@@ -262,6 +298,15 @@ impl Gpu {
             label: Some(label),
             size: bytes.max(16),
             usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        })
+    }
+
+    fn staging(&self, bytes: u64) -> wgpu::Buffer {
+        self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("staging"),
+            size: bytes,
+            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         })
     }
@@ -298,6 +343,7 @@ impl Gpu {
             format: wgpu::TextureFormat::Rgba16Float,
             usage: wgpu::TextureUsages::TEXTURE_BINDING
                 | wgpu::TextureUsages::STORAGE_BINDING
+                | wgpu::TextureUsages::COPY_SRC
                 | wgpu::TextureUsages::COPY_DST,
             view_formats: &[],
         })
@@ -326,6 +372,13 @@ impl Gpu {
             wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row, rows_per_image: Some(texture.height()) },
             texture.size(),
         );
+    }
+
+    /// Fills a texture and its mips with the bytes that [`Work::download_texture`] gave.
+    pub(crate) fn restore_texture(&self, texture: &wgpu::Texture, bytes: &[u8]) {
+        for (target, layout, size) in mips(texture) {
+            self.queue.write_texture(target, bytes, layout, size);
+        }
     }
 
     /// Starts recording work.
@@ -418,13 +471,18 @@ impl Work<'_> {
 
     /// Brings `bytes` of a buffer back; [`Work::submit`] returns them in the order of the calls.
     pub fn download(&mut self, buffer: &wgpu::Buffer, offset: u64, bytes: u64) {
-        let staging = self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("staging"),
-            size: bytes,
-            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
+        let staging = self.gpu.staging(bytes);
         self.encoder.copy_buffer_to_buffer(buffer, offset, &staging, 0, bytes);
+        self.downloads.push(staging);
+    }
+
+    /// The same for a texture of half floats and its mips.
+    pub fn download_texture(&mut self, texture: &wgpu::Texture) {
+        let staging = self.gpu.staging(texture_bytes(texture));
+        for (source, layout, size) in mips(texture) {
+            let target = wgpu::TexelCopyBufferInfo { buffer: &staging, layout };
+            self.encoder.copy_texture_to_buffer(source, target, size);
+        }
         self.downloads.push(staging);
     }
 
@@ -466,6 +524,32 @@ impl Work<'_> {
         }
         Ok(downloads)
     }
+}
+
+/// The mips of a texture of half floats, and where their texels lie in memory, one mip after the other.
+fn mips(
+    texture: &wgpu::Texture,
+) -> impl Iterator<Item = (wgpu::TexelCopyTextureInfo<'_>, wgpu::TexelCopyBufferLayout, wgpu::Extent3d)> {
+    let mut end = 0;
+    (0..texture.mip_level_count()).map(move |mip_level| {
+        let size = texture.size().mip_level_size(mip_level, texture.dimension());
+        // Rows that are downloaded begin at multiples of 256 bytes.
+        let row = (8 * size.width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let offset = end;
+        end += u64::from(row) * u64::from(size.height) * u64::from(size.depth_or_array_layers);
+        let layout =
+            wgpu::TexelCopyBufferLayout { offset, bytes_per_row: Some(row), rows_per_image: Some(size.height) };
+        (wgpu::TexelCopyTextureInfo { mip_level, ..texture.as_image_copy() }, layout, size)
+    })
+}
+
+/// How many bytes [`Work::download_texture`] gives.
+pub(crate) fn texture_bytes(texture: &wgpu::Texture) -> u64 {
+    let bytes = |layout: wgpu::TexelCopyBufferLayout, size: wgpu::Extent3d| {
+        let row = u64::from(layout.bytes_per_row.unwrap_or(0));
+        layout.offset + row * u64::from(size.height) * u64::from(size.depth_or_array_layers)
+    };
+    mips(texture).last().map_or(0, |(_, layout, size)| bytes(layout, size))
 }
 
 /// Bytes that came back from the GPU.

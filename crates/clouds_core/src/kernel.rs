@@ -1,6 +1,9 @@
 //! A compute pipeline whose resources are bound by name: binding numbers and workgroup sizes stand in WGSL alone.
 
+use std::borrow::Cow;
+
 use crate::error::{Error, Result};
+use crate::frame::Frame;
 use crate::gpu::Gpu;
 use crate::params::{Model, Params, Quality};
 use crate::shader::Linked;
@@ -60,6 +63,11 @@ impl Variant {
         }
     }
 
+    /// What a picture needs that is seen in a frame.
+    pub fn of_frame(params: &Params, quality: &Quality, frame: &Frame) -> Self {
+        Self { sunlit: frame.sunlit(params), ..Self::new(params, quality) }
+    }
+
     fn constants(self) -> [(&'static str, f64); 7] {
         let switch = |on| f64::from(u8::from(on));
         [
@@ -115,16 +123,17 @@ impl Kernel {
             .ok_or_else(|| Error::Device(format!("no kernel named {entry:?}")))?;
         let workgroup = module.entry_points[index].workgroup_size;
         let variables = used_variables(&module, &info, index);
+        let declared = |name: &str| module.overrides.iter().any(|(_, o)| o.name.as_deref() == Some(name));
+        let constants: Vec<_> = variant.constants().into_iter().filter(|(name, _)| declared(name)).collect();
         let descriptor = wgpu::ShaderModuleDescriptor {
             label: Some(entry),
-            source: wgpu::ShaderSource::Wgsl(linked.code.as_str().into()),
+            // What has been parsed already, not the text.
+            source: wgpu::ShaderSource::Naga(Cow::Owned(module)),
         };
         let checks = wgpu::ShaderRuntimeChecks { force_loop_bounding: false, ..Default::default() };
         // SAFETY: only loop bounding is off, which costs a counter in every loop (ten times the time on some drivers,
         // gfx-rs/wgpu#7698). The shaders are this crate's own, and each of their loops ends. Bounds checks stay.
         let shader = unsafe { gpu.device.create_shader_module_trusted(descriptor, checks) };
-        let declared = |name: &str| module.overrides.iter().any(|(_, o)| o.name.as_deref() == Some(name));
-        let constants: Vec<_> = variant.constants().into_iter().filter(|(name, _)| declared(name)).collect();
         let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label: Some(entry),
             layout: None,
@@ -134,7 +143,7 @@ impl Kernel {
                 zero_initialize_workgroup_memory: false,
                 constants: &constants,
             },
-            cache: None,
+            cache: gpu.pipelines.cache(),
         });
         let layout = pipeline.get_bind_group_layout(0);
         gpu.check()?;

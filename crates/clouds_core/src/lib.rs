@@ -4,6 +4,7 @@
 //! function that reads top to bottom. `ARCHITECTURE.md` follows a frame through the files.
 
 mod blue_noise;
+pub mod cache;
 pub mod camera;
 pub mod color;
 pub mod error;

@@ -2,7 +2,8 @@
 
 use std::mem;
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
+use std::thread;
 use std::time::Instant;
 
 use glam::DVec3;
@@ -71,7 +72,21 @@ enum Method {
     Path,
 }
 
+/// The kernels of the bakes that are kept from no earlier process.
+const BAKES: [(&str, &str); 3] = [("high_clouds", "high_clouds"), ("sky", "sky_map_bake"), ("sky", "sky_light_bake")];
+
 impl Method {
+    /// The kernels of a still.
+    fn kernels(self, quality: &Quality) -> Vec<(&'static str, &'static str)> {
+        let clouds: &[_] = match self {
+            Self::March if quality.contrast > 0.0 => &[("march", "march_list"), ("refine", "refine")],
+            Self::March => &[("march", "march")],
+            Self::Reference => &[("reference", "reference")],
+            Self::Path => &[("path", "path")],
+        };
+        [&BAKES, clouds, &[("composite", "composite")]].concat()
+    }
+
     fn new(params: &Params, quality: &Quality) -> Self {
         match params.light.model {
             Model::Path => Self::Path,
@@ -131,7 +146,11 @@ impl Renderer {
                 return Err(Error::parameter(name, value, "a whole number from 1 to 65536 pixels"));
             }
         }
-        let gpu = Gpu::open(adapter)?;
+        // Each takes a process's first renderer some 20 ms of one thread.
+        let gpu = thread::scope(|scope| {
+            scope.spawn(|| LazyLock::force(&blue_noise::TILE));
+            Gpu::open(adapter)
+        })?;
         let pace = Pace::new(if gpu.info.kind == "cpu" { 3e5 } else { 1e8 });
         Ok(Self {
             world: World::new(&gpu),
@@ -190,7 +209,10 @@ impl Renderer {
         frame.first_sample = first_sample;
         let method = Method::new(params, &self.quality);
         let Self { gpu, world, quality, timings, .. } = self;
-        let scene = world.run(gpu, params, &frame, (camera.eye, time), quality, timings, interrupt)?;
+        let variant = Variant::of_frame(params, quality, &frame);
+        let scene = gpu.compiling(&method.kernels(quality), variant, || {
+            world.run(gpu, params, &frame, (camera.eye, time), quality, timings, interrupt)
+        })?;
 
         let [width, height] = self.size;
         let mut picture = Picture::default();
@@ -244,6 +266,7 @@ impl Renderer {
                 Ok(())
             })?;
         }
+        gpu.pipelines.store();
         Ok(picture)
     }
 
@@ -296,7 +319,10 @@ impl Renderer {
         // shot keeps the still's, and so becomes the still.
         let round = if frame.moving > 0 { index / 16 } else { 0 };
         frame.jitter_shift = (f64::from(round) * 0.618_033_988_749_895).fract() as f32;
-        let scene = world.run(gpu, params, &frame, (camera.eye, time), quality, timings, interrupt)?;
+        let variant = Variant::of_frame(params, quality, &frame);
+        let scene = gpu.compiling(&Method::March.kernels(quality), variant, || {
+            world.run(gpu, params, &frame, (camera.eye, time), quality, timings, interrupt)
+        })?;
 
         let mut ctx = Context { gpu, uniforms: scene.uniforms, variant: scene.variant, timings, interrupt };
         let Animation { refined, fresh, before, now, .. } = &*animation;
@@ -326,6 +352,7 @@ impl Renderer {
             Ok(())
         })?;
 
+        gpu.pipelines.store();
         mem::swap(&mut animation.before, &mut animation.now);
         animation.last = Some(Shot { camera: *camera, params: params.clone(), time, frame, index });
         Ok(image)
@@ -491,7 +518,7 @@ impl World {
     fn new(gpu: &Gpu) -> Self {
         let side = blue_noise::SIZE as u32;
         let texture = gpu.texture("blue_noise", [side, side, 1], 1);
-        let texels: Vec<_> = blue_noise::tile().iter().map(|v| [half::f16::from_f32(*v); 4]).collect();
+        let texels: Vec<_> = blue_noise::TILE.iter().map(|v| [half::f16::from_f32(*v); 4]).collect();
         gpu.write_texture(&texture, &texels);
         Self {
             uniforms: Uniforms::new(gpu),
@@ -518,7 +545,7 @@ impl World {
         interrupt: Interrupt<'_>,
     ) -> Result<Scene<'_>> {
         self.uniforms.upload(gpu, params, frame, quality);
-        let variant = Variant { sunlit: frame.sunlit(params), ..Variant::new(params, quality) };
+        let variant = Variant::of_frame(params, quality, frame);
         let mut ctx = Context { gpu, uniforms: &self.uniforms, variant, timings, interrupt };
 
         let noise = self.noise.insert(Noise::run(&mut ctx, params)?); // once for a seed

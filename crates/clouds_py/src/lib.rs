@@ -12,7 +12,7 @@ use clouds_core::gpu::{self, lock};
 use clouds_core::params::{Params, Quality};
 use clouds_core::renderer::Renderer as CoreRenderer;
 use clouds_core::schema::Value;
-use clouds_core::{DensityGrid as CoreGrid, Error, Result, color, files, params, schema};
+use clouds_core::{DensityGrid as CoreGrid, Error, Result, cache, color, files, params, schema};
 use glam::DVec3;
 use numpy::{PyArray1, PyArrayMethods as _, PyReadonlyArrayDyn, PyUntypedArrayMethods as _};
 use pyo3::prelude::*;
@@ -601,11 +601,22 @@ fn write_hdr(py: Python<'_>, path: PathBuf, frame: PyReadonlyArrayDyn<'_, f32>) 
     raise(py, files::write_hdr(&path, frame.as_slice()?, [shape[1], shape[0]], shape[2]))
 }
 
+/// The folder of the cache, None where it is off, and how many bytes are in it.
+#[pyfunction]
+fn cache_usage() -> (Option<PathBuf>, u64) {
+    (cache::folder(), cache::size())
+}
+
+#[pyfunction]
+fn clear_cache(py: Python<'_>) -> PyResult<()> {
+    raise(py, cache::clear())
+}
+
 #[pymodule]
 mod _nubis {
     #[pymodule_export]
     use super::{
-        Camera, DensityGrid, Renderer, adapters, check, check_params, check_quality, number, quality, to_srgb8,
-        write_exr, write_hdr, write_png,
+        Camera, DensityGrid, Renderer, adapters, cache_usage, check, check_params, check_quality, clear_cache, number,
+        quality, to_srgb8, write_exr, write_hdr, write_png,
     };
 }

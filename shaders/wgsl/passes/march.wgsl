@@ -136,8 +136,8 @@ fn march_ray(direction: vec3f, offset: f32, within: vec2f) -> Cloud {
     var sum = Gathered();
 
     let big = quality.big_step;
-    // Measured on `fair_weather`: 12 steps of slack cost no time, and leave an error of 1 %; one big step left 6 %.
-    let slack = f32(4u * big);
+    // Measured on `fair_weather`: one big step of slack errs by 6 %, 4 by 2 %, 8 as little as all of the ray, in 3 % more time.
+    let slack = f32(8u * big);
     let end = u32(clamp(step_index(steps, within.y) + slack, 0.0, f32(steps.count)));
     var i = u32(clamp(step_index(steps, within.x) - slack, 0.0, f32(steps.count))); // the step at hand
     var span = NOWHERE;

@@ -16,12 +16,14 @@ pub mod sun_volume;
 pub mod volume;
 pub mod weather;
 
-use crate::error::Result;
+use crate::cache;
+use crate::error::{Error, Result};
 use crate::frame::Frame;
-use crate::gpu::{Gpu, Interrupt, Timings};
+use crate::gpu::{Download, Gpu, Interrupt, Timings, texture_bytes};
 use crate::kernel::{Binding, Variant};
 use crate::params::{self, Params, Quality};
 use crate::schema::{self, Block as _};
+use crate::shader::Linked;
 
 /// The variables that a kernel may use, by name.
 pub(crate) type Bindings<'a> = Vec<(&'static str, Binding<'a>)>;
@@ -95,4 +97,42 @@ impl<K: PartialEq, T> Baked<K, T> {
         }
         Ok(&self.made.as_ref().expect("was just made").1)
     }
+}
+
+/// Fills textures with what an earlier process has baked for `key`, or by `bake`, for the next process to find.
+///
+/// Only where the CPU bakes: a GPU needs a few milliseconds, which is less than reading the file takes.
+pub(crate) fn kept<'a>(
+    ctx: &mut Context<'a>,
+    pass: &str,
+    key: &str,
+    textures: &[&wgpu::Texture],
+    bake: impl FnOnce(&mut Context<'a>) -> Result<()>,
+) -> Result<()> {
+    let gpu = ctx.gpu;
+    if gpu.info.kind != "cpu" || cache::folder().is_none() {
+        return bake(ctx);
+    }
+    let shader = Linked::new(&format!("passes/{pass}")).map_err(Error::Device)?.code;
+    let bytes: Vec<_> = textures.iter().map(|texture| texture_bytes(texture) as usize).collect();
+    // Drivers differ in how they round.
+    let key = format!("{} {}\n{key}\n{bytes:?}\n{shader}", gpu.info.name, gpu.info.driver);
+    if let Some(stored) = cache::load(pass, &key).filter(|stored| stored.len() == bytes.iter().sum()) {
+        let mut rest = stored.as_slice();
+        for (texture, bytes) in textures.iter().zip(bytes) {
+            let (own, others) = rest.split_at(bytes);
+            gpu.restore_texture(texture, own);
+            rest = others;
+        }
+        return Ok(());
+    }
+    bake(ctx)?;
+    let mut work = gpu.work();
+    for texture in textures {
+        work.download_texture(texture);
+    }
+    let baked = work.submit(ctx.timings, ctx.interrupt)?;
+    let parts: Vec<&[u8]> = baked.iter().map(Download::numbers).collect();
+    cache::store(pass, &key, &parts);
+    Ok(())
 }

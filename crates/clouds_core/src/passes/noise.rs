@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Bindings, Context};
+use super::{Bindings, Context, kept};
 use crate::error::Result;
 use crate::gpu::lock;
 use crate::params::{self, Params};
@@ -30,10 +30,15 @@ impl Noise {
         if let Some(noise) = shared.as_ref().filter(|noise| noise.key == key) {
             return Ok(noise.clone());
         }
-        let shape = volume(ctx, "shape", SHAPE_SIZE)?;
-        let detail = volume(ctx, "detail", DETAIL_SIZE)?;
+        let volume = |label, size: u32| ctx.gpu.texture(label, [size; 3], size.ilog2() + 1);
+        let shape = volume("shape", SHAPE_SIZE);
+        let detail = volume("detail", DETAIL_SIZE);
         let curl = ctx.gpu.texture("curl", [CURL_SIZE, CURL_SIZE, 1], 1);
-        super::weather::bake_map(ctx, "noise", "curl", &curl)?;
+        kept(ctx, "noise", &format!("{key:?}"), &[&shape, &detail, &curl], |ctx| {
+            bake_volume(ctx, "shape", &shape)?;
+            bake_volume(ctx, "detail", &detail)?;
+            super::weather::bake_map(ctx, "noise", "curl", &curl)
+        })?;
         let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
         let noise = Arc::new(Self { key, shape: view(&shape), detail: view(&detail), curl: view(&curl) });
         *shared = Some(noise.clone());
@@ -50,9 +55,8 @@ impl Noise {
 }
 
 /// Bakes a volume with the kernel `entry`, and its mips from it.
-fn volume(ctx: &mut Context<'_>, entry: &str, size: u32) -> Result<wgpu::Texture> {
-    let mips = size.ilog2() + 1;
-    let texture = ctx.gpu.texture(entry, [size; 3], mips);
+fn bake_volume(ctx: &mut Context<'_>, entry: &str, texture: &wgpu::Texture) -> Result<()> {
+    let size = texture.width();
     let mip = |level: u32| {
         texture.create_view(&wgpu::TextureViewDescriptor {
             base_mip_level: level,
@@ -66,11 +70,11 @@ fn volume(ctx: &mut Context<'_>, entry: &str, size: u32) -> Result<wgpu::Texture
     bindings.push(("volume_out", (&out).into()));
     work.dispatch(&*ctx.gpu.kernel("noise", entry, ctx.variant)?, &bindings, [size; 3])?;
     let downsample = ctx.gpu.kernel("noise", "downsample", ctx.variant)?;
-    for level in 1..mips {
+    for level in 1..texture.mip_level_count() {
         let (from, to) = (mip(level - 1), mip(level));
         let bindings = [("volume_in", (&from).into()), ("volume_out", (&to).into())];
         work.dispatch(&downsample, &bindings, [size >> level; 3])?;
     }
     work.submit(ctx.timings, ctx.interrupt)?;
-    Ok(texture)
+    Ok(())
 }

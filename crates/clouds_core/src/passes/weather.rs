@@ -1,6 +1,6 @@
 //! The weather map: baked from noise, or the user's own.
 
-use super::{Baked, Bindings, Context};
+use super::{Baked, Bindings, Context, kept};
 use crate::error::Result;
 use crate::params::{self, Params};
 use crate::schema::Map;
@@ -30,7 +30,9 @@ impl Weather {
                 Some(map) => upload(ctx, map),
                 None => {
                     let texture = ctx.gpu.texture("weather", [SIZE, SIZE, 1], 1);
-                    bake_map(ctx, "weather", "weather", &texture)?;
+                    kept(ctx, "weather", &format!("{weather:?}"), &[&texture], |ctx| {
+                        bake_map(ctx, "weather", "weather", &texture)
+                    })?;
                     texture
                 }
             };

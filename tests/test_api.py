@@ -94,7 +94,7 @@ def test_same_inputs_same_bytes(renderer):
     make.density([[0, 0, 2000]], other[1])
     list(make.animate([(*other, 0.0), (*other, 1.0)]))
     assert make.render(camera, params, time=12.5).tobytes() == first
-    fresh = nubis.Renderer(64, 36, quality="draft")
+    fresh = nubis.Renderer(64, 36, quality=make.quality)
     assert fresh.render(camera, params, time=12.5).tobytes() == first
 
 
@@ -102,7 +102,7 @@ def test_same_inputs_same_bytes(renderer):
     "quality", ["draft", "balanced", "high", "nubis2015", "thesis2018", "vsu2022"]
 )
 def test_named_methods(renderer, quality):
-    make = renderer(16, 9, quality)
+    make = nubis.Renderer(16, 9, quality=quality)
     assert make.quality == nubis.quality(quality) and isinstance(make.quality, nubis.Quality)
     frame = make.render(*nubis.scenes["in_cloud"])
     assert np.isfinite(frame).all()
@@ -233,7 +233,8 @@ def test_exceptions():
 
 def test_threads(renderer):
     """Renderers of the same and of different threads keep out of each other's way."""
-    shared, own = renderer(64, 36), [nubis.Renderer(64, 36, quality="draft") for _ in range(2)]
+    shared = renderer(64, 36, nubis.quality("draft"))
+    own = [nubis.Renderer(64, 36, quality="draft") for _ in range(2)]
     expected = shared.render(CAMERA, PARAMS).tobytes()
     pictures = []
 

@@ -11,7 +11,11 @@ BARE = {"atmosphere.aerial_perspective": 0.0, "high_clouds.coverage": 0.0}
 
 
 def layers(size, contrast, scene="fair_weather", quality="balanced", **changes):
-    camera, params = nubis.scenes[scene]
+    """A part of a scene: pixels of a tenth of a degree, of which one in sixteen is marched first."""
+    eye = nubis.scenes[scene][0].eye
+    target = np.add(eye, (0.3, 1.0, -0.2 if scene == "above" else 0.25))
+    camera = nubis.Camera.look_at(eye, target, (0, 0, 1), min(0.1 * size[1], 60.0))
+    params = nubis.scenes[scene][1]
     quality = nubis.quality(quality).replace(contrast=contrast)
     return nubis.Renderer(*size, quality=quality).render_layers(camera, params.with_(**changes))
 

@@ -191,6 +191,7 @@ def fine(view_steps, light_steps=1, **changes):
         "far_sample": False,
         "cheap_light": 1.0,
         "min_transmittance": 0.0,
+        "contrast": 0.0,
         "jitter": False,
         "view_distance": 1e9,
     }

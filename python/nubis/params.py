@@ -347,8 +347,9 @@ class Quality(Block):
         from 0 to 0.5.
     contrast : float
         Largest contrast between neighbouring rays, past which the pixels between them get rays of
-        their own. One pixel in sixteen is marched first; 0 marches all of them. Allowed: a number
-        from 0 to 1.
+        their own. Of pixels less than an eighth of a degree wide one in sixteen is marched first,
+        of a quarter one in four, of wider ones every one; 0 marches every one of any width.
+        Allowed: a number from 0 to 1.
     jitter : bool
         Whether each ray starts at a blue-noise offset of up to one step. Allowed: True or False.
     view_distance : float

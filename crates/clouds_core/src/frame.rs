@@ -1,6 +1,8 @@
 //! What the renderer knows about a frame and its user does not set: the `frame` uniform. Everything that would lose
 //! its digits in f32 (planet radii, long times, distant eyes) is worked out here in f64.
 
+use std::f32::consts::PI;
+
 use glam::{DVec2, DVec3, Vec3};
 
 use crate::camera::{Camera, Projection};
@@ -33,6 +35,8 @@ params! {
         march_width: u32 = 1;
         /// Every how many of those a ray is known, in both directions (passes/refine).
         lattice: u32 = 1;
+        /// 1 when the rays look for cloud where their neighbours have found it, 0 when they look everywhere.
+        spans: u32 = 0;
         /// 1 to put the clouds before the sky, 0 to return them alone.
         background: u32 = 1;
         /// 1 when anything but the jitter differs from the frame before.
@@ -195,6 +199,16 @@ impl Frame {
         frame.sun_volume_eye = sun_volume::eye_in(camera.eye, params, time);
         frame.sun_direction = sun_direction(params).as_vec3().to_array();
         frame
+    }
+
+    /// Angle between marched pixels in the middle of the picture, radians (`pixel_width` of camera.wgsl).
+    pub fn marched_angle(&self) -> f32 {
+        let pixel = match self.camera_kind {
+            kind if kind == Projection::Equirect as u32 => 2.0 * PI / self.width as f32,
+            kind if kind == Projection::Fisheye as u32 => 2.0 * self.half_fov / self.width.min(self.height) as f32,
+            _ => 2.0 * self.tan_half_fov / self.height as f32,
+        };
+        pixel * self.stride as f32
     }
 
     /// Whether the sun can reach the clouds: false only where `sky_light` is none (passes/sky.wgsl, atmosphere.wgsl).

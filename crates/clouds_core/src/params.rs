@@ -221,8 +221,9 @@ params! {
         cheap_light: f32 = 1.0, in 0..=1 "";
         /// Transmittance at which a ray ends; what is left is scaled away, not lost.
         min_transmittance: f32 = 0.01, in 0..=0.5 "";
-        /// Largest contrast between neighbouring rays, past which the pixels between them get rays of their own. One pixel in
-        /// sixteen is marched first; 0 marches all of them.
+        /// Largest contrast between neighbouring rays, past which the pixels between them get rays of their own. Of pixels
+        /// less than an eighth of a degree wide one in sixteen is marched first, of a quarter one in four, of wider ones
+        /// every one; 0 marches every one of any width.
         contrast: f32 = 0.1, in 0..=1 "";
         /// Whether each ray starts at a blue-noise offset of up to one step.
         jitter: bool = true;

@@ -77,9 +77,9 @@ const BAKES: [(&str, &str); 3] = [("high_clouds", "high_clouds"), ("sky", "sky_m
 
 impl Method {
     /// The kernels of a still.
-    fn kernels(self, quality: &Quality) -> Vec<(&'static str, &'static str)> {
+    fn kernels(self, quality: &Quality, frame: &Frame) -> Vec<(&'static str, &'static str)> {
         let clouds: &[_] = match self {
-            Self::March if quality.contrast > 0.0 => &[("march", "march_list"), ("refine", "refine")],
+            Self::March if refine::coarsest(frame, quality) > 1 => &[("march", "march_list"), ("refine", "refine")],
             Self::March => &[("march", "march")],
             Self::Reference => &[("reference", "reference")],
             Self::Path => &[("path", "path")],
@@ -210,7 +210,7 @@ impl Renderer {
         let method = Method::new(params, &self.quality);
         let Self { gpu, world, quality, timings, .. } = self;
         let variant = Variant::of_frame(params, quality, &frame);
-        let scene = gpu.compiling(&method.kernels(quality), variant, || {
+        let scene = gpu.compiling(&method.kernels(quality, &frame), variant, || {
             world.run(gpu, params, &frame, (camera.eye, time), quality, timings, interrupt)
         })?;
 
@@ -320,7 +320,7 @@ impl Renderer {
         let round = if frame.moving > 0 { index / 16 } else { 0 };
         frame.jitter_shift = (f64::from(round) * 0.618_033_988_749_895).fract() as f32;
         let variant = Variant::of_frame(params, quality, &frame);
-        let scene = gpu.compiling(&Method::March.kernels(quality), variant, || {
+        let scene = gpu.compiling(&Method::March.kernels(quality, &frame), variant, || {
             world.run(gpu, params, &frame, (camera.eye, time), quality, timings, interrupt)
         })?;
 
@@ -632,7 +632,8 @@ fn march_sheet(
     out: &Marched,
 ) -> Result<()> {
     let (gpu, interrupt) = (ctx.gpu, ctx.interrupt);
-    if quality.contrast == 0.0 {
+    let coarsest = refine::coarsest(frame, quality);
+    if coarsest == 1 {
         let size = [frame.march_width, frame.sheet_row + frame.sheet_rows];
         return in_bands(pace, gpu, scene, frame, size, |frame| {
             let mut work = gpu.work();
@@ -641,7 +642,7 @@ fn march_sheet(
         });
     }
     let mut frame = frame.clone();
-    frame.lattice = COARSEST;
+    frame.lattice = coarsest;
     let mut rays = refined.begin(gpu, &frame);
     loop {
         frame.first_ray = 0;
@@ -664,6 +665,7 @@ fn march_sheet(
         work.download(&refined.count, 0, 4);
         rays = work.submit(ctx.timings, interrupt)?[0].numbers()[0];
         frame.lattice /= 2;
+        frame.spans = 1;
     }
 }
 

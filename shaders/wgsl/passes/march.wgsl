@@ -5,9 +5,6 @@
 #import density
 #import light
 
-// Distance of the pixels that are marched first (as in refine.rs).
-const COARSEST = 4u;
-
 @compute @workgroup_size(8, 8)
 fn march(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= frame.march_width || id.y >= frame.rows {
@@ -23,8 +20,7 @@ fn march_list(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let index = active_rays[frame.first_ray + id.x];
-    // Rays of the coarsest lattice look everywhere, later ones where their neighbours have found cloud.
-    let known = select(cloud_span[index], EVERYWHERE, frame.lattice == COARSEST);
+    let known = select(EVERYWHERE, cloud_span[index], frame.spans > 0u);
     cloud_span[index] = march_cell(index, known);
 }
 

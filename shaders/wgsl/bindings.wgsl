@@ -5,6 +5,7 @@
 // What a pipeline is made for; the rest is compiled out (crates/clouds_core/src/kernel.rs).
 override MODEL: u32 = 0u; // light.model
 override VOLUME: bool = false; // the clouds are the user's grid, not procedural
+override CAMERA: u32 = 0u; // the projection, see camera.wgsl
 override PRECISE: bool = false; // that grid is read by loads and in f32, not filtered by the hardware in half floats
 
 @group(0) @binding(0) var<uniform> params: Params;
@@ -20,7 +21,7 @@ override PRECISE: bool = false; // that grid is read by loads and in f32, not fi
 @group(0) @binding(7) var weather_map: texture_2d<f32>; // coverage, type, precipitation (passes/weather)
 @group(0) @binding(8) var high_map: texture_2d<f32>; // density of the high clouds (passes/high_clouds)
 @group(0) @binding(9) var sky_map: texture_2d<f32>; // the sky by direction, see SKY_MAP_SCALE (passes/sky)
-@group(0) @binding(10) var<storage, read_write> sky_light: array<vec4f, 4>; // what the sky gives to clouds (passes/sky)
+@group(0) @binding(10) var<uniform> sky_light: array<vec4f, 4>; // what the sky gives to clouds (passes/sky)
 @group(0) @binding(11) var blue_noise: texture_2d<f32>; // 64 x 64 ranks in [0, 1), void and cluster
 
 @group(0) @binding(30) var volume: texture_3d<f32>; // the user's grid, 1 at its largest extinction, in half floats
@@ -106,6 +107,7 @@ struct PathRay {
 // Outputs of the bakes.
 @group(0) @binding(23) var volume_in: texture_3d<f32>;
 @group(0) @binding(24) var volume_out: texture_storage_3d<rgba16float, write>;
+@group(0) @binding(38) var<storage, read_write> sky_light_out: array<vec4f, 4>;
 @group(0) @binding(25) var map_out: texture_storage_2d<rgba16float, write>;
 
 // Queries at points, and probes of shader functions.

@@ -12,7 +12,7 @@ fn view_direction(pixel: vec2f) -> vec4f {
     let ndc = vec2f(2.0, -2.0) * (pixel / size) + vec2f(-1.0, 1.0); // right and up
     var local: vec3f; // right, up, forward
     var valid = 1.0;
-    switch frame.camera_kind {
+    switch CAMERA {
         case EQUIRECT: {
             let longitude = ndc.x * PI;
             let latitude = ndc.y * 0.5 * PI;
@@ -43,7 +43,7 @@ fn previous_pixel(direction: vec3f) -> vec3f {
     );
     var ndc: vec2f;
     var valid = true;
-    switch frame.camera_kind {
+    switch CAMERA {
         case EQUIRECT: {
             ndc = vec2f(atan2(local.x, local.z) / PI, asin(clamp(local.y, -1.0, 1.0)) / (0.5 * PI));
         }
@@ -65,7 +65,7 @@ fn previous_pixel(direction: vec3f) -> vec3f {
 
 // Width of a pixel at distance 1, in the middle of the picture.
 fn pixel_width() -> f32 {
-    switch frame.camera_kind {
+    switch CAMERA {
         case EQUIRECT: {
             return 2.0 * PI / f32(frame.width);
         }

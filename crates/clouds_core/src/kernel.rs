@@ -35,18 +35,39 @@ pub(crate) struct Variant {
     pub volume: bool,
     /// Whether that grid is read in f32.
     pub precise: bool,
+    /// The projection of the camera, for kernels that know pixels.
+    pub camera: u32,
+    /// Whether there are high clouds, for `composite`.
+    pub high: bool,
+    /// Whether the sky and the depth are asked for, for `composite`.
+    pub layers: bool,
 }
 
 impl Variant {
     /// What a picture needs.
     pub fn new(params: &Params, quality: &Quality) -> Self {
         let model = params.light.model;
-        Self { model, volume: params.volume.is_some(), precise: quality.tolerance > 0.0 || model == Model::Path }
+        Self {
+            model,
+            volume: params.volume.is_some(),
+            precise: quality.tolerance > 0.0 || model == Model::Path,
+            // What single passes ask for beside.
+            camera: 0,
+            high: false,
+            layers: false,
+        }
     }
 
-    fn constants(self) -> [(&'static str, f64); 3] {
+    fn constants(self) -> [(&'static str, f64); 6] {
         let switch = |on| f64::from(u8::from(on));
-        [("MODEL", f64::from(self.model as u32)), ("VOLUME", switch(self.volume)), ("PRECISE", switch(self.precise))]
+        [
+            ("MODEL", f64::from(self.model as u32)),
+            ("VOLUME", switch(self.volume)),
+            ("PRECISE", switch(self.precise)),
+            ("CAMERA", f64::from(self.camera)),
+            ("HIGH", switch(self.high)),
+            ("LAYERS", switch(self.layers)),
+        ]
     }
 }
 

@@ -210,7 +210,7 @@ impl Renderer {
                 (Method::Path, Some(rays)) => path::run(&mut ctx, &scene, &frame, rays, &still.marched)?,
                 _ => march::run(gpu, &mut work, &scene, &frame, &still.marched)?,
             }
-            composite::run(gpu, &mut work, &scene, &frame, &still.marched, &still.composed)?;
+            composite::run(gpu, &mut work, &scene, &frame, &still.marched, &still.composed, all)?;
             work.download(&still.composed.image, 0, 16 * pixels);
             if all {
                 work.download(&still.composed.sky, 0, 16 * pixels);
@@ -316,7 +316,7 @@ impl Renderer {
         in_bands(&mut self.pixel_pace, gpu, &scene, &mut frame, [width, height], |frame| {
             let mut work = gpu.work();
             let (row, rows) = (u64::from(frame.first_row), u64::from(frame.rows));
-            composite::run(gpu, &mut work, &scene, frame, &animation.now.marched, &animation.composed)?;
+            composite::run(gpu, &mut work, &scene, frame, &animation.now.marched, &animation.composed, false)?;
             work.download(&animation.composed.image, 16 * u64::from(width) * row, 16 * u64::from(width) * rows);
             image.extend_from_slice(work.submit(timings, interrupt)?[0].numbers());
             Ok(())
@@ -527,6 +527,7 @@ impl World {
             [uniforms, noise.bindings(), weather, high_clouds, sky, volume, blue_noise].concat();
         let majorants = self.majorants.run(&mut ctx, params, &bindings)?; // when paths are traced
         bindings.extend(majorants);
+        let variant = Variant { camera: frame.camera_kind, ..variant };
         Ok(Scene { uniforms: &self.uniforms, variant, bindings })
     }
 }

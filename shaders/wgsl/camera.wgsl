@@ -33,7 +33,7 @@ fn view_direction(pixel: vec2f) -> vec4f {
     return vec4f(normalize(direction), valid);
 }
 
-// The pixel that a direction from the previous camera falls on; z is 0 where it falls on none.
+// The pixel that a direction from the previous camera falls on, in the picture or not; z is 0 behind the camera.
 fn previous_pixel(direction: vec3f) -> vec3f {
     let size = vec2f(f32(frame.width), f32(frame.height));
     let local = vec3f(
@@ -51,7 +51,6 @@ fn previous_pixel(direction: vec3f) -> vec3f {
             let sine = length(local.xy);
             let r = atan2(sine, local.z) / frame.previous_half_fov;
             ndc = local.xy / max(sine, 1e-9) * r * min(size.x, size.y) / size;
-            valid = r <= 1.0;
         }
         default: {
             valid = local.z > 1e-6;
@@ -59,8 +58,26 @@ fn previous_pixel(direction: vec3f) -> vec3f {
         }
     }
     let pixel = (ndc * vec2f(0.5, -0.5) + 0.5) * size;
-    valid = valid && all(pixel >= vec2f(0.0)) && all(pixel <= size);
     return vec3f(pixel, select(0.0, 1.0, valid));
+}
+
+// Whether there is a picture at a pixel: not beyond its edges, where a panorama has only two, nor the circle of a fisheye.
+fn in_picture(pixel: vec2f) -> bool {
+    let size = vec2f(f32(frame.width), f32(frame.height));
+    if CAMERA == FISHEYE {
+        return distance(pixel, 0.5 * size) <= 0.5 * min(size.x, size.y);
+    }
+    let within = (pixel >= vec2f(0.0)) & (pixel <= size);
+    return within.y && (within.x || CAMERA == EQUIRECT);
+}
+
+// The same motion across a picture, around a panorama the shorter way.
+fn shortest_way(motion: vec2f) -> vec2f {
+    if CAMERA == EQUIRECT {
+        let width = f32(frame.width);
+        return motion - vec2f(width * round(motion.x / width), 0.0);
+    }
+    return motion;
 }
 
 // Width of a pixel at distance 1, in the middle of the picture.

@@ -62,5 +62,9 @@ pub(crate) fn run(
         ("known", (&out.known).into()),
     ];
     let bindings = [scene.bindings.as_slice(), &out.marched.bindings(), &ours].concat();
-    work.dispatch(&*gpu.kernel("reproject", "reproject", scene.variant)?, &bindings, [frame.width, frame.rows, 1])
+    work.dispatch(
+        &*gpu.kernel("reproject", "reproject", scene.variant)?,
+        &bindings,
+        [frame.march_width, frame.rows.div_ceil(STRIDE), 1],
+    )
 }

@@ -41,8 +41,6 @@ override PRECISE: bool = false; // that grid is read by loads and in f32, not fi
 @group(0) @binding(18) var<storage, read_write> fresh_depth: array<f32>;
 @group(0) @binding(19) var<storage, read_write> history: array<vec4f>;
 @group(0) @binding(20) var<storage, read_write> history_depth: array<f32>;
-@group(0) @binding(21) var<storage, read_write> history_known: array<u32>; // 1 where marched since the cut, 0 where guessed
-@group(0) @binding(22) var<storage, read_write> known: array<u32>;
 
 // Rays that take more steps than one dispatch may: what each remembers, which are not done, and how far each got.
 @group(0) @binding(33) var<storage, read_write> reference_rays: array<ReferenceRay>;

@@ -62,12 +62,12 @@ fn previous_pixel(direction: vec3f) -> vec3f {
 }
 
 // Whether there is a picture at a pixel: not beyond its edges, where a panorama has only two, nor the circle of a fisheye.
-fn in_picture(pixel: vec2f) -> bool {
-    let size = vec2f(f32(frame.width), f32(frame.height));
+fn in_picture(pixel: vec2i) -> bool {
+    let size = vec2i(vec2u(frame.width, frame.height));
     if CAMERA == FISHEYE {
-        return distance(pixel, 0.5 * size) <= 0.5 * min(size.x, size.y);
+        return distance(vec2f(pixel) + 0.5, 0.5 * vec2f(size)) <= 0.5 * f32(min(size.x, size.y));
     }
-    let within = (pixel >= vec2f(0.0)) & (pixel <= size);
+    let within = (pixel >= vec2i(0)) & (pixel < size);
     return within.y && (within.x || CAMERA == EQUIRECT);
 }
 

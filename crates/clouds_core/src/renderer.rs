@@ -19,7 +19,7 @@ use crate::passes::majorant::Majorants;
 use crate::passes::march::Marched;
 use crate::passes::noise::Noise;
 use crate::passes::rays::Rays;
-use crate::passes::reproject::{History, ORDER, STRIDE};
+use crate::passes::reproject::{ORDER, STRIDE};
 use crate::passes::sky::Sky;
 use crate::passes::volume::Volume;
 use crate::passes::weather::Weather;
@@ -101,8 +101,8 @@ struct Refined {
 /// Buffers of whole pictures, and what reprojection remembers of the frame before.
 struct Animation {
     fresh: Marched,
-    before: History,
-    now: History,
+    before: Marched,
+    now: Marched,
     composed: Composed,
     last: Option<Shot>,
 }
@@ -271,8 +271,8 @@ impl Renderer {
         let Self { gpu, world, quality, timings, .. } = self;
         let animation = self.animation.get_or_insert_with(|| Animation {
             fresh: Marched::new(gpu, u64::from(cells[0]) * u64::from(cells[1])),
-            before: History::new(gpu, pixels),
-            now: History::new(gpu, pixels),
+            before: Marched::new(gpu, pixels),
+            now: Marched::new(gpu, pixels),
             composed: Composed::new(gpu, pixels),
             last: None,
         });
@@ -292,10 +292,9 @@ impl Renderer {
         if last.is_none() {
             in_bands(&mut self.march_pace, gpu, &scene, &mut frame, [width, height], |frame| {
                 let mut work = gpu.work();
-                march::run(gpu, &mut work, &scene, frame, &animation.now.marched)?;
+                march::run(gpu, &mut work, &scene, frame, &animation.now)?;
                 work.submit(timings, interrupt).map(drop)
             })?;
-            gpu.queue.write_buffer(&animation.now.known, 0, bytemuck::cast_slice(&vec![1u32; pixels as usize]));
         } else {
             frame.stride = STRIDE;
             [frame.subpixel_x, frame.subpixel_y] = ORDER[index as usize % 16];
@@ -316,7 +315,7 @@ impl Renderer {
         in_bands(&mut self.pixel_pace, gpu, &scene, &mut frame, [width, height], |frame| {
             let mut work = gpu.work();
             let (row, rows) = (u64::from(frame.first_row), u64::from(frame.rows));
-            composite::run(gpu, &mut work, &scene, frame, &animation.now.marched, &animation.composed, false)?;
+            composite::run(gpu, &mut work, &scene, frame, &animation.now, &animation.composed, false)?;
             work.download(&animation.composed.image, 16 * u64::from(width) * row, 16 * u64::from(width) * rows);
             image.extend_from_slice(work.submit(timings, interrupt)?[0].numbers());
             Ok(())

@@ -22,8 +22,8 @@ struct Cell {
     low: vec4f,
     high: vec4f,
     distance: f32, // m to the nearest cloud among them, -1 if there is none
-    motion: vec2f, // pixels to where it was
-    seen: bool, // whether it was anywhere
+    shift: vec2i, // whole pixels to where it was
+    seen: bool, // whether it was before the camera
 }
 
 @compute @workgroup_size(8, 8)
@@ -51,12 +51,13 @@ fn reproject(@builtin(global_invocation_id) id: vec3u) {
     let was = previous_pixel(normalize(before));
     // What stands still is where it was, to the bit: a narrow view, a pole of a panorama or a wide picture turn the
     // rounding of a direction into a good part of a pixel.
-    cell.motion = select(shortest_way(was.xy - centre), vec2f(0.0), frame.moving == 0u);
+    let motion = select(shortest_way(was.xy - centre), vec2f(0.0), frame.moving == 0u);
+    cell.shift = vec2i(round(motion));
     cell.seen = was.z > 0.0 || frame.moving == 0u;
 
     // The frame before between pixel centres, by Catmull-Rom splines: linear interpolation, repeated every frame, would
     // blur. What has moved by whole pixels reads them, exactly. Four rows at a time make one.
-    let snapped = select(cell.motion, round(cell.motion), abs(cell.motion - round(cell.motion)) < vec2f(1e-3));
+    let snapped = select(motion, round(motion), abs(motion - round(motion)) < vec2f(1e-3));
     let corner = cell.corner + vec2i(floor(snapped)) - 1;
     let across = catmull_rom(snapped.x - floor(snapped.x));
     let down = catmull_rom(snapped.y - floor(snapped.y));
@@ -98,14 +99,9 @@ fn fill(cell: Cell, place: vec2i, old: vec4f) {
     let guess = (cell.above * y.x + cell.level * y.y + cell.below * y.z) * x;
     var value = select(guess, cell.level[1], is_fresh);
     var value_depth = select(cell.distance, fresh_depth[fresh_index(cell.corner / STRIDE)], is_fresh);
-    var value_known = is_fresh;
-
-    let was = vec2f(pixel) + 0.5 + cell.motion;
-    let old_index = pixel_index(vec2i(floor(was)));
-    if !is_fresh && cell.seen && in_picture(was) && history_known[old_index] > 0u && is_finite4(old) {
+    if !is_fresh && cell.seen && in_picture(pixel + cell.shift) && is_finite4(old) {
         value = select(clamp(old, cell.low, cell.high), old, frame.moving == 0u);
-        value_known = true;
-        value_depth = select(cell.distance, history_depth[old_index], frame.moving == 0u);
+        value_depth = select(cell.distance, history_depth[pixel_index(pixel)], frame.moving == 0u);
     }
     if !is_finite4(value) {
         value = vec4f(0.0, 0.0, 0.0, 1.0);
@@ -115,7 +111,6 @@ fn fill(cell: Cell, place: vec2i, old: vec4f) {
     // Thinner than f32 tells from nothing, a cloud may still shine from where it is.
     let clear = value.a >= 1.0 && all(value.rgb <= vec3f(0.0));
     cloud_depth[index] = select(max(value_depth, 0.0), -1.0, clear);
-    known[index] = select(0u, 1u, value_known);
 }
 
 // The three marched pixels around a cell in its row.

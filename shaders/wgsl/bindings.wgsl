@@ -105,6 +105,7 @@ struct PathRay {
 // Outputs of the bakes.
 @group(0) @binding(23) var volume_in: texture_3d<f32>;
 @group(0) @binding(24) var volume_out: texture_storage_3d<rgba16float, write>;
+@group(0) @binding(22) var<storage, read_write> texels_out: array<u32>; // of one channel, two half floats in each
 @group(0) @binding(38) var<storage, read_write> sky_light_out: array<vec4f, 4>;
 @group(0) @binding(25) var map_out: texture_storage_2d<rgba16float, write>;
 

@@ -306,6 +306,20 @@ impl Gpu {
         })
     }
 
+    /// A flat square texture of one half-float channel, to be filled from a buffer.
+    pub(crate) fn map(&self, label: &str, size: u32) -> wgpu::Texture {
+        self.device.create_texture(&wgpu::TextureDescriptor {
+            label: Some(label),
+            size: wgpu::Extent3d { width: size, height: size, depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: wgpu::TextureFormat::R16Float,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+            view_formats: &[],
+        })
+    }
+
     /// A texture of one channel that is filled from here: half floats to be filtered, or f32 to be loaded.
     pub(crate) fn volume(&self, label: &str, size: [u32; 3], format: wgpu::TextureFormat) -> wgpu::Texture {
         self.device.create_texture(&wgpu::TextureDescriptor {
@@ -417,6 +431,14 @@ impl Work<'_> {
     /// Fills a buffer with zeros.
     pub fn clear(&mut self, buffer: &wgpu::Buffer) {
         self.encoder.clear_buffer(buffer, 0, None);
+    }
+
+    /// Fills a texture of [`Gpu::map`] from a buffer, whose rows are padded to whole 256 bytes.
+    pub fn fill(&mut self, texture: &wgpu::Texture, texels: &wgpu::Buffer) {
+        let bytes_per_row = Some((2 * texture.width()).next_multiple_of(256));
+        let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row, rows_per_image: Some(texture.height()) };
+        let source = wgpu::TexelCopyBufferInfo { buffer: texels, layout };
+        self.encoder.copy_buffer_to_texture(source, texture.as_image_copy(), texture.size());
     }
 
     /// Brings `bytes` of a buffer back; [`Work::submit`] returns them in the order of the calls.

@@ -121,15 +121,15 @@ fn whole_air(direction: vec3f, ground: Hit) -> vec3f {
         return vec3f(1.0);
     }
     // From above the air, start where the ray enters it.
-    let p = air.near * direction;
-    return air_transmittance(max(altitude_at(p), 0.0), cos_zenith_at(p, direction));
+    let altitude = select(max(frame.altitude, 0.0), AIR_TOP, frame.power_air > 0.0);
+    return air_transmittance(altitude, cos_zenith_along(direction, air.near, altitude));
 }
 
 // The high clouds where a ray crosses their sphere, or nothing.
 fn high_layer(direction: vec3f, distance: f32, visible: bool) -> Layer {
     // What is not seen reads the texture in one place, from the cache.
     let p = select(vec3f(0.0), distance * direction, visible);
-    let slant = max(abs(cos_zenith_at(p, direction)), 0.02);
+    let slant = max(abs(cos_zenith_along(direction, distance, params.high_clouds.altitude)), 0.02);
     // An eye that climbs through a layer without thickness would see it jump from above to below: near it, it fades.
     let fade = saturate(abs(frame.altitude - params.high_clouds.altitude) / HIGH_FADE);
     let optical_depth = select(0.0, fade * high_optical_depth(p), visible);

@@ -107,7 +107,7 @@ fn further_orders(h: f32, mu_sun: f32) -> vec3f {
     let vertical = RAYLEIGH * RAYLEIGH_HEIGHT;
     let noon = 0.26 * (1.0 - exp(-1.5 * vertical));
     // Light that has been scattered before has come a higher and shorter way than the direct light.
-    let dimmed = exp(-0.3 * RAYLEIGH * chapman(h, max(mu_sun, 0.0), RAYLEIGH_HEIGHT)
+    let dimmed = exp(-0.3 * RAYLEIGH * chapman_up(h, max(mu_sun, 0.0), RAYLEIGH_HEIGHT)
         - OZONE / max(mu_sun + 0.12, 0.12));
     let height_of_sun = smoothstep(-0.2, 0.5, mu_sun);
     return noon * dimmed * (0.9 * height_of_sun + 0.1 * smoothstep(-0.25, 0.0, mu_sun));

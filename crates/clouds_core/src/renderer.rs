@@ -304,19 +304,17 @@ impl Renderer {
                 march::run(gpu, &mut work, &scene, frame, &animation.fresh)?;
                 work.submit(timings, interrupt).map(drop)
             })?;
-            in_bands(&mut self.pixel_pace, gpu, &scene, &mut frame, [width, height], |frame| {
-                let mut work = gpu.work();
-                let Animation { fresh, before, now, .. } = &*animation;
-                reproject::run(gpu, &mut work, &scene, frame, fresh, before, now)?;
-                work.submit(timings, interrupt).map(drop)
-            })?;
         }
         let mut image = Vec::with_capacity(4 * pixels as usize);
         in_bands(&mut self.pixel_pace, gpu, &scene, &mut frame, [width, height], |frame| {
             let mut work = gpu.work();
+            let Animation { fresh, before, now, composed, .. } = &*animation;
+            if last.is_some() {
+                reproject::run(gpu, &mut work, &scene, frame, fresh, before, now)?;
+            }
+            composite::run(gpu, &mut work, &scene, frame, now, composed, false)?;
             let (row, rows) = (u64::from(frame.first_row), u64::from(frame.rows));
-            composite::run(gpu, &mut work, &scene, frame, &animation.now, &animation.composed, false)?;
-            work.download(&animation.composed.image, 16 * u64::from(width) * row, 16 * u64::from(width) * rows);
+            work.download(&composed.image, 16 * u64::from(width) * row, 16 * u64::from(width) * rows);
             image.extend_from_slice(work.submit(timings, interrupt)?[0].numbers());
             Ok(())
         })?;

@@ -41,7 +41,8 @@ fn composite(@builtin(global_invocation_id) id: vec3u) {
     let ground = hit_sphere(direction, frame.power_ground);
     let air = Air(sky_radiance(direction), whole_air(direction, ground));
 
-    let here = Layer(clouds[index].rgb, clouds[index].a, max(cloud_depth[index], 0.0));
+    let cloud = clouds[index];
+    let here = Layer(cloud.rgb, cloud.a, max(cloud_depth[index], 0.0));
     var seen = through_air(here, altitude_at(here.distance * direction), air);
     if HIGH {
         // The high clouds where the ray enters their sphere, which it cannot from inside, and where it leaves it; each

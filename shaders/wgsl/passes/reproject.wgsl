@@ -21,7 +21,8 @@ struct Cell {
     below: mat3x4f,
     low: vec4f,
     high: vec4f,
-    distance: f32, // m to the nearest cloud among them, -1 if there is none
+    own_distance: f32, // m to the cloud of its own marched pixel, -1 if there is none
+    distance: f32, // m to the nearest cloud of the nine, -1 if there is none
     shift: vec2i, // whole pixels to where it was
     seen: bool, // whether it was before the camera
 }
@@ -42,6 +43,7 @@ fn reproject(@builtin(global_invocation_id) id: vec3u) {
     let deviation = sqrt(max(square - mean * mean, vec4f(0.0)));
     cell.low = mean - SPREAD * deviation;
     cell.high = mean + SPREAD * deviation;
+    cell.own_distance = fresh_depth[fresh_index(at)];
     cell.distance = nearest_cloud(at);
 
     // Where the cloud seen here was in the frame before. Where no cloud is near, the sky stands still.
@@ -98,7 +100,7 @@ fn fill(cell: Cell, place: vec2i, old: vec4f) {
     let y = hats(offset.y);
     let guess = (cell.above * y.x + cell.level * y.y + cell.below * y.z) * x;
     var value = select(guess, cell.level[1], is_fresh);
-    var value_depth = select(cell.distance, fresh_depth[fresh_index(cell.corner / STRIDE)], is_fresh);
+    var value_depth = select(cell.distance, cell.own_distance, is_fresh);
     if !is_fresh && cell.seen && in_picture(pixel + cell.shift) && is_finite4(old) {
         value = select(clamp(old, cell.low, cell.high), old, frame.moving == 0u);
         value_depth = select(cell.distance, history_depth[pixel_index(pixel)], frame.moving == 0u);

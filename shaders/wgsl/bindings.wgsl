@@ -21,7 +21,10 @@ override PRECISE: bool = false; // that grid is read by loads and in f32, not fi
 @group(0) @binding(7) var weather_map: texture_2d<f32>; // coverage, type, precipitation (passes/weather)
 @group(0) @binding(8) var high_map: texture_2d<f32>; // density of the high clouds (passes/high_clouds)
 @group(0) @binding(9) var sky_map: texture_2d<f32>; // the sky by direction, see SKY_MAP_SCALE (passes/sky)
-@group(0) @binding(10) var<uniform> sky_light: array<vec4f, 4>; // what the sky gives to clouds (passes/sky)
+@group(0) @binding(10) var<storage, read_write> sky_light: array<vec4f, 4>; // what the sky gives to clouds (passes/sky)
+// The same for passes over every pixel: a load from storage costs lavapipe a loop over the lanes. Where it decides a branch
+// (march, path) it must not be a uniform: lavapipe (Mesa 22.3.6) compiles for the values of those, and crashes.
+@group(0) @binding(38) var<uniform> sky_light_uniform: array<vec4f, 4>;
 @group(0) @binding(11) var blue_noise: texture_2d<f32>; // 64 x 64 ranks in [0, 1), void and cluster
 
 @group(0) @binding(30) var volume: texture_3d<f32>; // the user's grid, 1 at its largest extinction, in half floats
@@ -106,7 +109,6 @@ struct PathRay {
 @group(0) @binding(23) var volume_in: texture_3d<f32>;
 @group(0) @binding(24) var volume_out: texture_storage_3d<rgba16float, write>;
 @group(0) @binding(22) var<storage, read_write> texels_out: array<u32>; // of one channel, two half floats in each
-@group(0) @binding(38) var<storage, read_write> sky_light_out: array<vec4f, 4>;
 @group(0) @binding(25) var map_out: texture_storage_2d<rgba16float, write>;
 
 // Queries at points, and probes of shader functions.

@@ -136,9 +136,9 @@ fn high_layer(direction: vec3f, distance: f32, visible: bool) -> Layer {
     let optical_depth = select(0.0, fade * high_optical_depth(p), visible);
     let transmittance = transmittance_of(optical_depth / slant);
     let sun = sun_scattering(optical_depth, 0.0, one_minus_cos(direction, frame.sun_direction));
-    var radiance = sun * sky_light[3].rgb;
+    var radiance = sun * sky_light_uniform[3].rgb;
     if MODEL != MODEL_SINGLE {
-        radiance += ambient_above();
+        radiance += ambient_of(sky_light_uniform[0].rgb);
     }
     return Layer((1.0 - transmittance) * radiance, transmittance, distance);
 }

@@ -61,8 +61,8 @@ fn sky_light_bake(@builtin(local_invocation_index) thread: u32) {
     // Much of what a cloud sees is other clouds, which are as bright as the sky but white; more so at its base, where
     // half is the ground, and the rest is sky between clouds.
     let white = vec3f(dot(above, vec3f(0.2126, 0.7152, 0.0722)));
-    sky_light_out[0] = vec4f(mix(above, white, 0.4), 1.0);
-    sky_light_out[1] = vec4f(0.5 * ground + 0.35 * mix(above, white, 0.7), 1.0);
-    sky_light_out[2] = vec4f(sun_irradiance(middle, mu), 1.0);
-    sky_light_out[3] = vec4f(sun_irradiance(params.high_clouds.altitude, mu), 1.0);
+    sky_light[0] = vec4f(mix(above, white, 0.4), 1.0);
+    sky_light[1] = vec4f(0.5 * ground + 0.35 * mix(above, white, 0.7), 1.0);
+    sky_light[2] = vec4f(sun_irradiance(middle, mu), 1.0);
+    sky_light[3] = vec4f(sun_irradiance(params.high_clouds.altitude, mu), 1.0);
 }

@@ -30,12 +30,12 @@ impl Sky {
             bake_map(ctx, "sky", "sky_map_bake", &map)?;
             let light = ctx.gpu.buffer("sky_light", 64);
             let mut bindings = ctx.uniforms.bindings();
-            bindings.push(("sky_light_out", (&light).into()));
+            bindings.push(("sky_light", (&light).into()));
             let mut work = ctx.gpu.work();
             work.dispatch(&*ctx.gpu.kernel("sky", "sky_light_bake", ctx.variant)?, &bindings, [64, 1, 1])?;
             work.submit(ctx.timings, ctx.interrupt)?;
             Ok((map.create_view(&wgpu::TextureViewDescriptor::default()), light))
         })?;
-        Ok(vec![("sky_map", map.into()), ("sky_light", light.into())])
+        Ok(vec![("sky_map", map.into()), ("sky_light", light.into()), ("sky_light_uniform", light.into())])
     }
 }

@@ -22,8 +22,8 @@ override PRECISE: bool = false; // that grid is read by loads and in f32, not fi
 @group(0) @binding(8) var high_map: texture_2d<f32>; // density of the high clouds (passes/high_clouds)
 @group(0) @binding(9) var sky_map: texture_2d<f32>; // the sky by direction, see SKY_MAP_SCALE (passes/sky)
 @group(0) @binding(10) var<storage, read_write> sky_light: array<vec4f, 4>; // what the sky gives to clouds (passes/sky)
-// The same for passes over every pixel: a load from storage costs lavapipe a loop over the lanes. Where it decides a branch
-// (march, path) it must not be a uniform: lavapipe (Mesa 22.3.6) compiles for the values of those, and crashes.
+// The same for `composite`: a load from storage costs lavapipe a loop over the lanes. Not for all: as a uniform of number 10
+// it crashed lavapipe (Mesa 22.3.6) in `path`, where it decides a branch; with a number after all others it did not.
 @group(0) @binding(38) var<uniform> sky_light_uniform: array<vec4f, 4>;
 @group(0) @binding(11) var blue_noise: texture_2d<f32>; // 64 x 64 ranks in [0, 1), void and cluster
 

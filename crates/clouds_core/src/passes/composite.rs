@@ -27,7 +27,7 @@ impl Composed {
     }
 }
 
-/// Composes the band of `frame`; `layers` fills `sky` and `depth` too, which takes lavapipe a fifth of the time.
+/// Composes the band of `frame`; `layers` fills `sky` and `depth` too, which takes lavapipe a seventh of the time.
 pub(crate) fn run(
     gpu: &Gpu,
     work: &mut Work<'_>,

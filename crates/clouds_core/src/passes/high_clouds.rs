@@ -25,8 +25,9 @@ impl HighClouds {
         let size = if high.coverage > 0.0 { high.texture_size } else { 1 };
         let key = (high.seed, high.octaves, high.stretch, size, updates);
         let view = self.map.get(key, || {
-            // One channel: four of them, of which three are for nothing, drop out of the cache of a core (composite took
-            // a tenth longer on lavapipe). Such a texture cannot be stored to, so it is filled from a buffer.
+            // One channel: with four, three of them for nothing, it drops out of the cache of a core (reading it took
+            // composite 24 ms at 1080p on a busy machine, not 16). Such a texture cannot be stored to, so it is filled
+            // from a buffer.
             let texture = ctx.gpu.map("high_clouds", size);
             let texels = ctx.gpu.buffer("high_clouds", u64::from(2 * size.next_multiple_of(128) * size));
             let mut work = ctx.gpu.work();

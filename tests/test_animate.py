@@ -67,6 +67,19 @@ def test_what_moves_stays_near_the_still(renderer, move):
             assert colours(frame).mean() == pytest.approx(still.mean(), rel=0.1)
 
 
+def test_a_panorama_has_no_seam(renderer):
+    """What moves out at one side comes in at the other."""
+    params = PARAMS.with_(
+        **{"clouds.coverage": 0.7, "sun.azimuth": 0.0, "high_clouds.coverage": 0.0}
+    )
+    shots = [(nubis.Camera.equirect((200.0 * i, 0, 300)), params, 0.0) for i in range(12)]
+    *_, last = renderer(192, 96).animate(shots)
+    camera, params, time = shots[-1]
+    error = np.abs(colours(last) - colours(renderer(192, 96).render(camera, params, time=time)))
+    error = error[12:48].mean(axis=(0, 2))
+    assert error[0] < 1.5 * error[1:6].mean()
+
+
 def test_what_stops_becomes_the_still(renderer):
     shots = [MOVES["flight"](i) for i in range(9)]
     *_, last = renderer(*SIZE).animate(shots + shots[-1:] * 48)

@@ -241,3 +241,24 @@ def test_air_along_slanted_rays(scale_height):
     along = np.sqrt(r * r + s * s + 2 * r * s * mu) - EARTH
     expected = np.trapezoid(np.exp(-along / scale_height), s, axis=0)
     np.testing.assert_allclose(got[free], expected[free], rtol=0.02, atol=1e-3)
+
+
+def test_air_toward_what_stands_above():
+    """The short form for directions up is the same function, to the bit."""
+    h, mu = (v.ravel() for v in np.meshgrid([0.0, 100, 5000, 60_000], np.linspace(0, 1, 101)))
+    at = np.stack([h, mu], 1)
+    whole = probe("vec4f(air_transmittance(x.x, x.y), 1.0)", at, imports=["atmosphere"])
+    up = probe("vec4f(air_transmittance_up(x.x, x.y), 1.0)", at, imports=["atmosphere"])
+    assert (whole == up).all() and whole[:, :3].min() < 0.1 < 0.9 < whole[:, :3].max()
+
+
+def test_zenith_along_a_ray():
+    """The cosine from the altitude, which is known, and that from the point."""
+    elevation = np.radians(np.linspace(-5, 90, 60))
+    at = np.stack([np.cos(elevation), np.sin(elevation)], 1)
+    direction = "vec3f(x.x, 0.0, x.y)"
+    hit = f"hit_sphere({direction}, -2.0 * 6371000.0 * 8500.0 - 8500.0 * 8500.0).far"
+    at_point = f"cos_zenith_at({hit} * {direction}, {direction})"
+    got = probe(f"cos_zenith_along({direction}, {hit}, 8500.0)", at, imports=["shell"])
+    expected = probe(at_point, at, imports=["shell"])
+    np.testing.assert_allclose(got[:, 0], expected[:, 0], atol=1e-6)

@@ -15,6 +15,8 @@ const MIE_G = 0.8;
 // The whole ozone layer straight up: absorption 0.650, 1.881, 0.085e-6 1/m at its middle, a triangle 30 km wide.
 const OZONE = vec3f(0.00975, 0.0282, 0.0013);
 const OZONE_ALTITUDE = 25000.0;
+// Altitude where the air ends, m (as in frame.rs).
+const AIR_TOP = 100000.0;
 
 // exp(x^2) erfc(x) for x >= 0: the form 2 / (sqrt(pi) (x + sqrt(x^2 + c))) with c from 4 / pi, exact at 0, to 2, exact far
 // away; between them fitted to 0.1 %.
@@ -27,28 +29,44 @@ fn erfcx(x: f32) -> f32 {
 // function for x = (R + h) / H, sqrt(pi x / 2) erfcx(sqrt(x / 2) mu), which is right to 1 / x.
 fn chapman(h: f32, mu: f32, scale_height: f32) -> f32 {
     let x = (params.atmosphere.planet_radius + h) / scale_height;
-    let up = sqrt(0.5 * PI * x) * erfcx(sqrt(0.5 * x) * abs(mu));
+    let up = chapman_up(h, abs(mu), scale_height);
     if mu >= 0.0 {
-        return scale_height * exp(-max(h, 0.0) / scale_height) * up;
+        return up;
     }
     // Through the lowest point of the ray and out again: twice the way up from there, less the part behind.
     let x0 = sqrt(max(1.0 - mu * mu, 0.0)) * x;
     let lowest = h - (x - x0) * scale_height;
     // Through the ground: so deep that nothing arrives, but finite.
     let below = min(exp(-lowest / scale_height), 1e6);
-    return scale_height * max(2.0 * sqrt(0.5 * PI * x0) * below - up * exp(-max(h, 0.0) / scale_height), 0.0);
+    return max(2.0 * scale_height * sqrt(0.5 * PI * x0) * below - up, 0.0);
+}
+
+// The same for directions up, where mu is not negative: a third of the work.
+fn chapman_up(h: f32, mu: f32, scale_height: f32) -> f32 {
+    let x = (params.atmosphere.planet_radius + h) / scale_height;
+    return scale_height * exp(-max(h, 0.0) / scale_height) * sqrt(0.5 * PI * x) * erfcx(sqrt(0.5 * x) * mu);
 }
 
 // Transmittance of the air from altitude h to space along a direction with zenith cosine mu.
 fn air_transmittance(h: f32, mu: f32) -> vec3f {
+    return whole_air_transmittance(h, mu, vec2f(chapman(h, mu, RAYLEIGH_HEIGHT), chapman(h, mu, MIE_HEIGHT)));
+}
+
+// The same for directions up.
+fn air_transmittance_up(h: f32, mu: f32) -> vec3f {
+    return whole_air_transmittance(h, mu, vec2f(chapman_up(h, mu, RAYLEIGH_HEIGHT), chapman_up(h, mu, MIE_HEIGHT)));
+}
+
+// The same for the lengths through the two exponential layers, as at sea level.
+fn whole_air_transmittance(h: f32, mu: f32, lengths: vec2f) -> vec3f {
     if params.atmosphere.enabled == 0u {
         return vec3f(1.0);
     }
     let radius = params.atmosphere.planet_radius;
     let ratio = (radius + h) / (radius + OZONE_ALTITUDE);
     let ozone = OZONE / sqrt(max(1.0 - ratio * ratio * (1.0 - mu * mu), 1e-3));
-    let depth = RAYLEIGH * chapman(h, mu, RAYLEIGH_HEIGHT)
-        + params.atmosphere.haze * MIE_EXTINCTION * chapman(h, mu, MIE_HEIGHT)
+    let depth = RAYLEIGH * lengths.x
+        + params.atmosphere.haze * MIE_EXTINCTION * lengths.y
         + select(ozone, vec3f(0.0), h > OZONE_ALTITUDE);
     return exp(-depth);
 }
@@ -89,7 +107,7 @@ fn further_orders(h: f32, mu_sun: f32) -> vec3f {
     let vertical = RAYLEIGH * RAYLEIGH_HEIGHT;
     let noon = 0.26 * (1.0 - exp(-1.5 * vertical));
     // Light that has been scattered before has come a higher and shorter way than the direct light.
-    let dimmed = exp(-0.3 * RAYLEIGH * chapman(h, max(mu_sun, 0.0), RAYLEIGH_HEIGHT)
+    let dimmed = exp(-0.3 * RAYLEIGH * chapman_up(h, max(mu_sun, 0.0), RAYLEIGH_HEIGHT)
         - OZONE / max(mu_sun + 0.12, 0.12));
     let height_of_sun = smoothstep(-0.2, 0.5, mu_sun);
     return noon * dimmed * (0.9 * height_of_sun + 0.1 * smoothstep(-0.25, 0.0, mu_sun));
@@ -139,7 +157,8 @@ fn air_radiance(direction: vec3f) -> vec3f {
 
 // Radiance of the ground under the sun and a sky that adds a fifth to it.
 fn ground_radiance(mu_sun: f32) -> vec3f {
-    let sun = sun_irradiance(0.0, mu_sun) * max(mu_sun, 0.0);
+    let up = max(mu_sun, 0.0);
+    let sun = params.sun.irradiance * air_transmittance_up(0.0, up) * sun_above_ground(0.0, mu_sun) * up;
     let skylight = 0.12 * params.sun.irradiance * smoothstep(-0.15, 0.6, mu_sun) * vec3f(0.7, 0.9, 1.2);
     return params.atmosphere.ground_albedo / PI * (sun + skylight);
 }

@@ -5,6 +5,7 @@
 // What a pipeline is made for; the rest is compiled out (crates/clouds_core/src/kernel.rs).
 override MODEL: u32 = 0u; // light.model
 override VOLUME: bool = false; // the clouds are the user's grid, not procedural
+override CAMERA: u32 = 0u; // the projection, see camera.wgsl
 override PRECISE: bool = false; // that grid is read by loads and in f32, not filtered by the hardware in half floats
 override SUNLIT: bool = true; // the sun can reach the clouds
 override SUN_VOLUME: bool = false; // light from beyond the light samples is read from the sun volume
@@ -25,6 +26,9 @@ override LIGHT_CHEAP: bool = true; // there are light samples that do not
 @group(0) @binding(8) var high_map: texture_2d<f32>; // density of the high clouds (passes/high_clouds)
 @group(0) @binding(9) var sky_map: texture_2d<f32>; // the sky by direction, see SKY_MAP_SCALE (passes/sky)
 @group(0) @binding(10) var<storage, read_write> sky_light: array<vec4f, 4>; // what the sky gives to clouds (passes/sky)
+// The same for `composite`: a load from storage costs lavapipe a loop over the lanes. Not for all: as a uniform of number 10
+// it crashed lavapipe (Mesa 22.3.6) in `path`, where it decides a branch; with a number after all others it did not.
+@group(0) @binding(41) var<uniform> sky_light_uniform: array<vec4f, 4>;
 @group(0) @binding(11) var blue_noise: texture_2d<f32>; // 64 x 64 ranks in [0, 1), void and cluster
 
 @group(0) @binding(30) var volume: texture_3d<f32>; // the user's grid, 1 at its largest extinction, in half floats
@@ -45,8 +49,6 @@ override LIGHT_CHEAP: bool = true; // there are light samples that do not
 @group(0) @binding(18) var<storage, read_write> fresh_depth: array<f32>;
 @group(0) @binding(19) var<storage, read_write> history: array<vec4f>;
 @group(0) @binding(20) var<storage, read_write> history_depth: array<f32>;
-@group(0) @binding(21) var<storage, read_write> history_known: array<u32>; // 1 where marched since the cut, 0 where guessed
-@group(0) @binding(22) var<storage, read_write> known: array<u32>;
 
 // Pixels that are marched one by one: how many are in `active_rays`, and between which distances from the start of its
 // march each pixel's ray meets cloud (passes/refine).
@@ -116,6 +118,7 @@ struct PathRay {
 // Outputs of the bakes.
 @group(0) @binding(23) var volume_in: texture_3d<f32>;
 @group(0) @binding(24) var volume_out: texture_storage_3d<rgba16float, write>;
+@group(0) @binding(22) var<storage, read_write> texels_out: array<u32>; // of one channel, two half floats in each
 @group(0) @binding(25) var map_out: texture_storage_2d<rgba16float, write>;
 
 // Queries at points, and probes of shader functions.

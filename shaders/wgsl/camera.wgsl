@@ -12,7 +12,7 @@ fn view_direction(pixel: vec2f) -> vec4f {
     let ndc = vec2f(2.0, -2.0) * (pixel / size) + vec2f(-1.0, 1.0); // right and up
     var local: vec3f; // right, up, forward
     var valid = 1.0;
-    switch frame.camera_kind {
+    switch CAMERA {
         case EQUIRECT: {
             let longitude = ndc.x * PI;
             let latitude = ndc.y * 0.5 * PI;
@@ -33,7 +33,7 @@ fn view_direction(pixel: vec2f) -> vec4f {
     return vec4f(normalize(direction), valid);
 }
 
-// The pixel that a direction from the previous camera falls on; z is 0 where it falls on none.
+// The pixel that a direction from the previous camera falls on, in the picture or not; z is 0 behind the camera.
 fn previous_pixel(direction: vec3f) -> vec3f {
     let size = vec2f(f32(frame.width), f32(frame.height));
     let local = vec3f(
@@ -43,7 +43,7 @@ fn previous_pixel(direction: vec3f) -> vec3f {
     );
     var ndc: vec2f;
     var valid = true;
-    switch frame.camera_kind {
+    switch CAMERA {
         case EQUIRECT: {
             ndc = vec2f(atan2(local.x, local.z) / PI, asin(clamp(local.y, -1.0, 1.0)) / (0.5 * PI));
         }
@@ -51,7 +51,6 @@ fn previous_pixel(direction: vec3f) -> vec3f {
             let sine = length(local.xy);
             let r = atan2(sine, local.z) / frame.previous_half_fov;
             ndc = local.xy / max(sine, 1e-9) * r * min(size.x, size.y) / size;
-            valid = r <= 1.0;
         }
         default: {
             valid = local.z > 1e-6;
@@ -59,13 +58,31 @@ fn previous_pixel(direction: vec3f) -> vec3f {
         }
     }
     let pixel = (ndc * vec2f(0.5, -0.5) + 0.5) * size;
-    valid = valid && all(pixel >= vec2f(0.0)) && all(pixel <= size);
     return vec3f(pixel, select(0.0, 1.0, valid));
+}
+
+// Whether there is a picture at a pixel: not beyond its edges, where a panorama has only two, nor the circle of a fisheye.
+fn in_picture(pixel: vec2i) -> bool {
+    let size = vec2i(vec2u(frame.width, frame.height));
+    if CAMERA == FISHEYE {
+        return distance(vec2f(pixel) + 0.5, 0.5 * vec2f(size)) <= 0.5 * f32(min(size.x, size.y));
+    }
+    let within = (pixel >= vec2i(0)) & (pixel < size);
+    return within.y && (within.x || CAMERA == EQUIRECT);
+}
+
+// The same motion across a picture, around a panorama the shorter way.
+fn shortest_way(motion: vec2f) -> vec2f {
+    if CAMERA == EQUIRECT {
+        let width = f32(frame.width);
+        return motion - vec2f(width * round(motion.x / width), 0.0);
+    }
+    return motion;
 }
 
 // Width of a pixel at distance 1, in the middle of the picture.
 fn pixel_width() -> f32 {
-    switch frame.camera_kind {
+    switch CAMERA {
         case EQUIRECT: {
             return 2.0 * PI / f32(frame.width);
         }

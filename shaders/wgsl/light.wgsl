@@ -166,7 +166,11 @@ fn ambient_share(height: f32) -> f32 {
 
 // Ambient radiance from above and from below.
 fn ambient_above() -> vec3f {
-    return params.light.ambient + params.light.ambient_gain * params.light.ambient_top * sky_light[0].rgb;
+    return ambient_of(sky_light[0].rgb);
+}
+
+fn ambient_of(sky: vec3f) -> vec3f {
+    return params.light.ambient + params.light.ambient_gain * params.light.ambient_top * sky;
 }
 
 fn ambient_below() -> vec3f {

@@ -60,6 +60,11 @@ fn cos_zenith_at(p: vec3f, direction: vec3f) -> f32 {
     return dot(up, direction) / max(length(up), 1.0);
 }
 
+// The same for a ray from the camera and its own point at a distance, whose altitude is known: no square root.
+fn cos_zenith_along(direction: vec3f, distance: f32, altitude: f32) -> f32 {
+    return (frame.centre_distance * dot(frame.zenith, direction) + distance) / (params.atmosphere.planet_radius + altitude);
+}
+
 // The part of a ray where there can be cloud: up to two stretches, the second after the ray has passed under the base.
 // It runs to the last exit of the shell: ending it at the first would cut a band along the horizon.
 struct Stretches {

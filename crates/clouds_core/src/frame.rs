@@ -53,8 +53,10 @@ params! {
         /// Number of the first path of each pixel (passes/path).
         first_sample: u32 = 0;
 
-        /// Projection, as in camera.wgsl.
+        /// Projection, as in camera.wgsl, for which kernels are compiled.
         camera_kind: u32 = 0;
+        /// 1 where there are high clouds, for which `composite` is compiled.
+        high_clouds: u32 = 0;
         /// Tangent of half the vertical field of view.
         tan_half_fov: f32 = 1.0;
         /// Half the field of view of a fisheye in radians.
@@ -197,6 +199,7 @@ impl Frame {
         frame.set_wind(camera.eye, params, time);
         frame.set_volume(camera.eye, params);
         frame.sun_volume_eye = sun_volume::eye_in(camera.eye, params, time);
+        frame.high_clouds = u32::from(params.high_clouds.coverage > 0.0);
         frame.sun_direction = sun_direction(params).as_vec3().to_array();
         frame
     }

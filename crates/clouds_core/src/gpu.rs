@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use crate::cache::Pipelines;
 use crate::error::{Error, Result};
-use crate::kernel::{Binding, Kernel, Variant};
+use crate::kernel::{Binding, Kernel, Variant, Wanted};
 use crate::passes::noise::Noise;
 
 /// What an adapter says of itself.
@@ -254,20 +254,16 @@ impl Gpu {
     }
 
     /// Does `work` while `kernels` that it will ask for, each a pass and an entry, are compiled on other threads.
-    pub(crate) fn compiling<T>(
-        &self,
-        kernels: &[(&str, &str)],
-        variant: Variant,
-        work: impl FnOnce() -> Result<T>,
-    ) -> Result<T> {
-        let compiled = |entry: &str| {
+    pub(crate) fn compiling<T>(&self, kernels: &[Wanted], work: impl FnOnce() -> Result<T>) -> Result<T> {
+        let compiled = |entry: &str, variant| {
             let slot = lock(&self.kernels).get(&(entry.to_owned(), variant)).cloned();
             slot.is_some_and(|slot| lock(&slot).is_some())
         };
         thread::scope(|scope| {
-            let missing = kernels.iter().filter(|(_, entry)| !compiled(entry));
-            let threads: Vec<_> =
-                missing.map(|(pass, entry)| scope.spawn(move || self.kernel(pass, entry, variant).map(drop))).collect();
+            let missing = kernels.iter().filter(|(_, entry, variant)| !compiled(entry, *variant));
+            let threads: Vec<_> = missing
+                .map(|&(pass, entry, variant)| scope.spawn(move || self.kernel(pass, entry, variant).map(drop)))
+                .collect();
             let done = work()?;
             for thread in threads {
                 thread.join().unwrap_or_else(|panic| resume_unwind(panic))?;
@@ -297,7 +293,10 @@ impl Gpu {
         self.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some(label),
             size: bytes.max(16),
-            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST,
+            usage: wgpu::BufferUsages::STORAGE
+                | wgpu::BufferUsages::UNIFORM
+                | wgpu::BufferUsages::COPY_SRC
+                | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         })
     }
@@ -345,6 +344,20 @@ impl Gpu {
                 | wgpu::TextureUsages::STORAGE_BINDING
                 | wgpu::TextureUsages::COPY_SRC
                 | wgpu::TextureUsages::COPY_DST,
+            view_formats: &[],
+        })
+    }
+
+    /// A flat square texture of one half-float channel, to be filled from a buffer.
+    pub(crate) fn map(&self, label: &str, size: u32) -> wgpu::Texture {
+        self.device.create_texture(&wgpu::TextureDescriptor {
+            label: Some(label),
+            size: wgpu::Extent3d { width: size, height: size, depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: wgpu::TextureFormat::R16Float,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
             view_formats: &[],
         })
     }
@@ -467,6 +480,14 @@ impl Work<'_> {
     /// Fills a buffer with zeros.
     pub fn clear(&mut self, buffer: &wgpu::Buffer) {
         self.encoder.clear_buffer(buffer, 0, None);
+    }
+
+    /// Fills a texture of [`Gpu::map`] from a buffer, whose rows are padded to whole 256 bytes.
+    pub fn fill(&mut self, texture: &wgpu::Texture, texels: &wgpu::Buffer) {
+        let bytes_per_row = Some((2 * texture.width()).next_multiple_of(256));
+        let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row, rows_per_image: Some(texture.height()) };
+        let source = wgpu::TexelCopyBufferInfo { buffer: texels, layout };
+        self.encoder.copy_buffer_to_texture(source, texture.as_image_copy(), texture.size());
     }
 
     /// Brings `bytes` of a buffer back; [`Work::submit`] returns them in the order of the calls.

@@ -46,6 +46,12 @@ pub(crate) struct Variant {
     pub light_detail: bool,
     /// Whether there are light samples that do not.
     pub light_cheap: bool,
+    /// The projection of the camera, for kernels that know pixels.
+    pub camera: u32,
+    /// Whether there are high clouds, for `composite`.
+    pub high: bool,
+    /// Whether the sky and the depth are asked for, for `composite`.
+    pub layers: bool,
 }
 
 impl Variant {
@@ -60,15 +66,24 @@ impl Variant {
             sun_volume: quality.sun_volume && params.volume.is_none(),
             light_detail: quality.cheap_light > 0.0,
             light_cheap: quality.cheap_light < 1.0 || quality.far_sample,
+            // What single passes ask for beside.
+            camera: 0,
+            high: false,
+            layers: false,
         }
+    }
+
+    /// What a bake needs that knows no picture.
+    pub fn bake() -> Self {
+        Self::new(&Params::default(), &Quality::default())
     }
 
     /// What a picture needs that is seen in a frame.
     pub fn of_frame(params: &Params, quality: &Quality, frame: &Frame) -> Self {
-        Self { sunlit: frame.sunlit(params), ..Self::new(params, quality) }
+        Self { sunlit: frame.sunlit(params), camera: frame.camera_kind, ..Self::new(params, quality) }
     }
 
-    fn constants(self) -> [(&'static str, f64); 7] {
+    fn constants(self) -> [(&'static str, f64); 10] {
         let switch = |on| f64::from(u8::from(on));
         [
             ("MODEL", f64::from(self.model as u32)),
@@ -78,9 +93,15 @@ impl Variant {
             ("SUN_VOLUME", switch(self.sun_volume)),
             ("LIGHT_DETAIL", switch(self.light_detail)),
             ("LIGHT_CHEAP", switch(self.light_cheap)),
+            ("CAMERA", f64::from(self.camera)),
+            ("HIGH", switch(self.high)),
+            ("LAYERS", switch(self.layers)),
         ]
     }
 }
+
+/// A kernel of a pass, and what it is made for.
+pub(crate) type Wanted = (&'static str, &'static str, Variant);
 
 /// A compute pipeline and the variables that it uses.
 pub struct Kernel {

@@ -13,7 +13,7 @@ use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::gpu::{Gpu, Interrupt, Timings, Work, check_fork};
-use crate::kernel::{Kernel, Variant};
+use crate::kernel::{Kernel, Variant, Wanted};
 use crate::params::{Model, Params, Quality};
 use crate::passes::composite::Composed;
 use crate::passes::high_clouds::HighClouds;
@@ -22,7 +22,7 @@ use crate::passes::march::Marched;
 use crate::passes::noise::Noise;
 use crate::passes::rays::Rays;
 use crate::passes::refine::{COARSEST, Refined};
-use crate::passes::reproject::{History, ORDER, STRIDE};
+use crate::passes::reproject::{ORDER, STRIDE};
 use crate::passes::sky::Sky;
 use crate::passes::sun_volume::SunVolume;
 use crate::passes::volume::Volume;
@@ -77,14 +77,17 @@ const BAKES: [(&str, &str); 3] = [("high_clouds", "high_clouds"), ("sky", "sky_m
 
 impl Method {
     /// The kernels of a still.
-    fn kernels(self, quality: &Quality, frame: &Frame) -> Vec<(&'static str, &'static str)> {
+    fn kernels(self, quality: &Quality, frame: &Frame, variant: Variant, layers: bool) -> Vec<Wanted> {
         let clouds: &[_] = match self {
             Self::March if refine::coarsest(frame, quality) > 1 => &[("march", "march_list"), ("refine", "refine")],
             Self::March => &[("march", "march")],
             Self::Reference => &[("reference", "reference")],
             Self::Path => &[("path", "path")],
         };
-        [&BAKES, clouds, &[("composite", "composite")]].concat()
+        let with = |variant| move |&(pass, entry): &(&'static str, &'static str)| (pass, entry, variant);
+        let bakes = BAKES.iter().map(with(Variant::bake()));
+        let composite = ("composite", "composite", composite::variant(variant, frame, layers));
+        bakes.chain(clouds.iter().map(with(variant))).chain([composite]).collect()
     }
 
     fn new(params: &Params, quality: &Quality) -> Self {
@@ -121,8 +124,8 @@ struct Refining {
 struct Animation {
     refined: Refined,
     fresh: Marched,
-    before: History,
-    now: History,
+    before: Marched,
+    now: Marched,
     composed: Composed,
     last: Option<Shot>,
 }
@@ -210,7 +213,7 @@ impl Renderer {
         let method = Method::new(params, &self.quality);
         let Self { gpu, world, quality, timings, .. } = self;
         let variant = Variant::of_frame(params, quality, &frame);
-        let scene = gpu.compiling(&method.kernels(quality, &frame), variant, || {
+        let scene = gpu.compiling(&method.kernels(quality, &frame, variant, all), || {
             world.run(gpu, params, &frame, (camera.eye, time), quality, timings, interrupt)
         })?;
 
@@ -240,7 +243,7 @@ impl Renderer {
             in_bands(&mut self.pixel_pace, gpu, &scene, &mut frame, [width, sheet.end], |frame| {
                 let mut work = gpu.work();
                 let marched = &still.marched;
-                composite::run(gpu, &mut work, &scene, frame, marched, &still.composed)?;
+                composite::run(gpu, &mut work, &scene, frame, marched, &still.composed, all)?;
                 let first = u64::from(width) * u64::from(frame.first_row - frame.sheet_row);
                 let pixels = u64::from(width) * u64::from(frame.rows);
                 let layer = |work: &mut Work<'_>, buffer, bytes| work.download(buffer, bytes * first, bytes * pixels);
@@ -303,8 +306,8 @@ impl Renderer {
         let animation = self.animation.get_or_insert_with(|| Animation {
             refined: Refined::new(gpu, pixels),
             fresh: Marched::new(gpu, u64::from(cells[0]) * u64::from(cells[1])),
-            before: History::new(gpu, pixels),
-            now: History::new(gpu, pixels),
+            before: Marched::new(gpu, pixels),
+            now: Marched::new(gpu, pixels),
             composed: Composed::new(gpu, pixels),
             last: None,
         });
@@ -320,34 +323,31 @@ impl Renderer {
         let round = if frame.moving > 0 { index / 16 } else { 0 };
         frame.jitter_shift = (f64::from(round) * 0.618_033_988_749_895).fract() as f32;
         let variant = Variant::of_frame(params, quality, &frame);
-        let scene = gpu.compiling(&Method::March.kernels(quality, &frame), variant, || {
+        let scene = gpu.compiling(&Method::March.kernels(quality, &frame, variant, false), || {
             world.run(gpu, params, &frame, (camera.eye, time), quality, timings, interrupt)
         })?;
 
         let mut ctx = Context { gpu, uniforms: scene.uniforms, variant: scene.variant, timings, interrupt };
-        let Animation { refined, fresh, before, now, .. } = &*animation;
+        let Animation { refined, fresh, before, now, composed, .. } = &*animation;
         if last.is_none() {
             frame.sheet_rows = height;
-            march_sheet(&mut ctx, &scene, &mut frame, quality, &mut self.march_pace, refined, &now.marched)?;
-            gpu.queue.write_buffer(&animation.now.known, 0, bytemuck::cast_slice(&vec![1u32; pixels as usize]));
+            march_sheet(&mut ctx, &scene, &mut frame, quality, &mut self.march_pace, refined, now)?;
         } else {
             frame.stride = STRIDE;
             [frame.subpixel_x, frame.subpixel_y] = ORDER[index as usize % 16];
             frame.march_width = cells[0];
             frame.sheet_rows = cells[1];
             march_sheet(&mut ctx, &scene, &mut frame, quality, &mut self.march_pace, refined, fresh)?;
-            in_bands(&mut self.pixel_pace, gpu, &scene, &mut frame, [width, height], |frame| {
-                let mut work = gpu.work();
-                reproject::run(gpu, &mut work, &scene, frame, fresh, before, now)?;
-                work.submit(timings, interrupt).map(drop)
-            })?;
         }
         let mut image = Vec::with_capacity(4 * pixels as usize);
         in_bands(&mut self.pixel_pace, gpu, &scene, &mut frame, [width, height], |frame| {
             let mut work = gpu.work();
+            if last.is_some() {
+                reproject::run(gpu, &mut work, &scene, frame, fresh, before, now)?;
+            }
+            composite::run(gpu, &mut work, &scene, frame, now, composed, false)?;
             let (row, rows) = (u64::from(frame.first_row), u64::from(frame.rows));
-            composite::run(gpu, &mut work, &scene, frame, &animation.now.marched, &animation.composed)?;
-            work.download(&animation.composed.image, 16 * u64::from(width) * row, 16 * u64::from(width) * rows);
+            work.download(&composed.image, 16 * u64::from(width) * row, 16 * u64::from(width) * rows);
             image.extend_from_slice(work.submit(timings, interrupt)?[0].numbers());
             Ok(())
         })?;
@@ -546,7 +546,7 @@ impl World {
     ) -> Result<Scene<'_>> {
         self.uniforms.upload(gpu, params, frame, quality);
         let variant = Variant::of_frame(params, quality, frame);
-        let mut ctx = Context { gpu, uniforms: &self.uniforms, variant, timings, interrupt };
+        let mut ctx = Context { gpu, uniforms: &self.uniforms, variant: Variant::bake(), timings, interrupt };
 
         let noise = self.noise.insert(Noise::run(&mut ctx, params)?); // once for a seed
         let weather = self.weather.run(&mut ctx, params)?; // when its block changes
@@ -559,6 +559,7 @@ impl World {
         let uniforms = self.uniforms.bindings();
         let mut bindings: Bindings<'_> =
             [uniforms, noise.bindings(), weather, high_clouds, sky, volume, blue_noise].concat();
+        ctx.variant = variant;
         let majorants = self.majorants.run(&mut ctx, params, &bindings)?; // when paths are traced
         bindings.extend(majorants);
         let sun_volume = self.sun_volume.run(&mut ctx, params, frame, at, &bindings)?; // as clouds and eye move

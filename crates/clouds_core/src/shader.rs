@@ -68,9 +68,10 @@ impl Linked {
             let line = error.location(&self.code).map_or(1, |at| at.line_number as usize);
             format!("{}: {}", self.origin(line), error.emit_to_string(&self.code))
         })?;
-        let info = valid::Validator::new(valid::ValidationFlags::all(), valid::Capabilities::default())
-            .validate(&module)
-            .map_err(|error| {
+        // pack2x16float, which every backend that we open has.
+        let capabilities = valid::Capabilities::default() | valid::Capabilities::SHADER_FLOAT16_IN_FLOAT32;
+        let info =
+            valid::Validator::new(valid::ValidationFlags::all(), capabilities).validate(&module).map_err(|error| {
                 let line = error.location(&self.code).map_or(1, |at| at.line_number as usize);
                 format!("{}: {}", self.origin(line), error.emit_to_string(&self.code))
             })?;

@@ -1,84 +1,159 @@
 // Fills the picture from the subset of pixels that was marched, and from the frame before (nubis2015, "reprojection").
+// One invocation fills a cell. Its pixels have the same marched neighbours, and all but the same motion, so that these are
+// found, and the frame before is read, once for the sixteen of them: loads are all that this pass costs.
 #import bindings
 #import camera
 #import shell
+
+// Pixels of a cell in each direction (as in reproject.rs).
+const STRIDE = 4;
 
 // How many standard deviations of its neighbourhood a moving pixel may be from its mean. Measured on a pan: 1.25 blurs
 // (error 13.0 %), 2 keeps what 4 keeps (11.7 and 11.4 %) and still catches ghosts.
 const SPREAD = 2.0;
 
+// What the pixels of a cell have in common.
+struct Cell {
+    corner: vec2i, // its first pixel
+    // The marched pixels around it, row by row, and where their like is not found, a pixel of the past is a ghost.
+    above: mat3x4f,
+    level: mat3x4f,
+    below: mat3x4f,
+    low: vec4f,
+    high: vec4f,
+    own_distance: f32, // m to the cloud of its own marched pixel, -1 if there is none
+    distance: f32, // m to the nearest cloud of the nine, -1 if there is none
+    shift: vec2i, // whole pixels to where it was
+    seen: bool, // whether it was before the camera
+}
+
 @compute @workgroup_size(8, 8)
 fn reproject(@builtin(global_invocation_id) id: vec3u) {
-    if id.x >= frame.width || id.y >= frame.rows {
+    if id.x >= frame.march_width || id.y * u32(STRIDE) >= frame.rows {
         return;
     }
-    let pixel = vec2u(id.x, frame.first_row + id.y);
-    let index = pixel.y * frame.width + pixel.x;
-    let subpixel = vec2u(frame.subpixel_x, frame.subpixel_y);
-    let cell = vec2i(pixel / frame.stride);
-    let is_fresh = all(pixel % frame.stride == subpixel);
-
-    // The marched pixels around this one: their spread, a smooth guess, and the nearest cloud.
-    var mean = vec4f(0.0);
-    var square = vec4f(0.0);
-    var guess = vec4f(0.0);
-    var guess_weight = 0.0;
-    var distance = -1.0;
-    var nearest = 1e9;
-    for (var i = 0; i < 9; i++) {
-        let neighbour = cell + vec2i(i % 3, i / 3) - 1;
-        let at = fresh_index(neighbour);
-        let value = fresh[at];
-        mean += value / 9.0;
-        square += value * value / 9.0;
-        let offset = (vec2f(neighbour * i32(frame.stride)) + vec2f(subpixel) - vec2f(pixel)) / f32(frame.stride);
-        let weight = max(1.0 - abs(offset.x), 0.0) * max(1.0 - abs(offset.y), 0.0);
-        guess += weight * value;
-        guess_weight += weight;
-        let away = dot(offset, offset);
-        if fresh_depth[at] >= 0.0 && away < nearest {
-            nearest = away;
-            distance = fresh_depth[at];
-        }
-    }
-    guess = guess / max(guess_weight, 1e-6);
-    let own = fresh[fresh_index(cell)];
-    let own_depth = fresh_depth[fresh_index(cell)];
-
-    // Marched just now, or, without history, the smooth guess.
-    var value = select(guess, own, is_fresh);
-    var value_depth = select(distance, own_depth, is_fresh);
-    var value_known = is_fresh;
+    let at = vec2i(vec2u(id.x, frame.first_row / u32(STRIDE) + id.y));
+    var cell: Cell;
+    cell.corner = at * STRIDE;
+    cell.above = fresh_row(at - vec2i(0, 1));
+    cell.level = fresh_row(at);
+    cell.below = fresh_row(at + vec2i(0, 1));
+    let mean = (cell.above + cell.level + cell.below) * vec3f(1.0 / 9.0);
+    let square = (squares(cell.above) + squares(cell.level) + squares(cell.below)) / 9.0;
+    let deviation = sqrt(max(square - mean * mean, vec4f(0.0)));
+    cell.low = mean - SPREAD * deviation;
+    cell.high = mean + SPREAD * deviation;
+    cell.own_distance = fresh_depth[fresh_index(at)];
+    cell.distance = nearest_cloud(at);
 
     // Where the cloud seen here was in the frame before. Where no cloud is near, the sky stands still.
-    let view = view_direction(vec2f(pixel) + 0.5);
-    let away = select(frame.far_distance, distance, distance >= 0.0);
-    let before = away * view.xyz + frame.eye_motion - frame.cloud_motion;
+    let centre = vec2f(cell.corner) + 0.5 * f32(STRIDE);
+    let away = select(frame.far_distance, cell.distance, cell.distance >= 0.0);
+    let before = away * view_direction(centre).xyz + frame.eye_motion - frame.cloud_motion;
+    let was = previous_pixel(normalize(before));
     // What stands still is where it was, to the bit: a narrow view, a pole of a panorama or a wide picture turn the
     // rounding of a direction into a good part of a pixel.
-    let was = select(previous_pixel(normalize(before)), vec3f(vec2f(pixel) + 0.5, 1.0), frame.moving == 0u);
-    if was.z > 0.0 {
-        let old = history_at(was.xy);
-        let old_index = nearest_index(was.xy);
-        if history_known[old_index] > 0u && is_finite4(old) && !is_fresh {
-            var kept = old;
-            if frame.moving > 0u {
-                let deviation = sqrt(max(square - mean * mean, vec4f(0.0)));
-                kept = clamp(old, mean - SPREAD * deviation, mean + SPREAD * deviation);
-            }
-            value = kept;
-            value_known = true;
-            value_depth = select(distance, history_depth[old_index], frame.moving == 0u);
+    let motion = select(shortest_way(was.xy - centre), vec2f(0.0), frame.moving == 0u);
+    cell.shift = vec2i(round(motion));
+    cell.seen = was.z > 0.0 || frame.moving == 0u;
+
+    // The frame before between pixel centres, by Catmull-Rom splines: linear interpolation, repeated every frame, would
+    // blur. What has moved by whole pixels reads them, exactly. Four rows at a time make one.
+    let snapped = select(motion, round(motion), abs(motion - round(motion)) < vec2f(1e-3));
+    let corner = cell.corner + vec2i(floor(snapped)) - 1;
+    let across = catmull_rom(snapped.x - floor(snapped.x));
+    let down = catmull_rom(snapped.y - floor(snapped.y));
+    var a = history_row(corner, across);
+    var b = history_row(corner + vec2i(0, 1), across);
+    var c = history_row(corner + vec2i(0, 2), across);
+    var y = 0;
+    // Left at its end: lavapipe runs a loop that is left at its start once more, for nothing.
+    loop {
+        let d = history_row(corner + vec2i(0, y + 3), across);
+        let old = a * down.x + b * down.y + c * down.z + d * down.w;
+        fill(cell, vec2i(0, y), old[0]);
+        fill(cell, vec2i(1, y), old[1]);
+        fill(cell, vec2i(2, y), old[2]);
+        fill(cell, vec2i(3, y), old[3]);
+        if y == STRIDE - 1 {
+            break;
         }
+        a = b;
+        b = c;
+        c = d;
+        y++;
+    }
+}
+
+// Fills a pixel of a cell, for what the frame before has in its place.
+fn fill(cell: Cell, place: vec2i, old: vec4f) {
+    let pixel = cell.corner + place;
+    if pixel.x >= i32(frame.width) || pixel.y >= i32(frame.height) {
+        return;
+    }
+    let subpixel = vec2i(vec2u(frame.subpixel_x, frame.subpixel_y));
+    let is_fresh = all(place == subpixel);
+
+    // Marched just now, or, without history, a smooth guess.
+    let offset = vec2f(subpixel - place) / f32(STRIDE);
+    let x = hats(offset.x);
+    let y = hats(offset.y);
+    let guess = (cell.above * y.x + cell.level * y.y + cell.below * y.z) * x;
+    var value = select(guess, cell.level[1], is_fresh);
+    var value_depth = select(cell.distance, cell.own_distance, is_fresh);
+    if !is_fresh && cell.seen && in_picture(pixel + cell.shift) && is_finite4(old) {
+        value = select(clamp(old, cell.low, cell.high), old, frame.moving == 0u);
+        value_depth = select(cell.distance, history_depth[pixel_index(pixel)], frame.moving == 0u);
     }
     if !is_finite4(value) {
         value = vec4f(0.0, 0.0, 0.0, 1.0);
     }
+    let index = pixel_index(pixel);
     clouds[index] = vec4f(max(value.rgb, vec3f(0.0)), saturate(value.a));
     // Thinner than f32 tells from nothing, a cloud may still shine from where it is.
     let clear = value.a >= 1.0 && all(value.rgb <= vec3f(0.0));
     cloud_depth[index] = select(max(value_depth, 0.0), -1.0, clear);
-    known[index] = select(0u, 1u, value_known);
+}
+
+// The three marched pixels around a cell in its row.
+fn fresh_row(cell: vec2i) -> mat3x4f {
+    return mat3x4f(
+        fresh[fresh_index(cell - vec2i(1, 0))],
+        fresh[fresh_index(cell)],
+        fresh[fresh_index(cell + vec2i(1, 0))],
+    );
+}
+
+fn squares(m: mat3x4f) -> vec4f {
+    return m[0] * m[0] + m[1] * m[1] + m[2] * m[2];
+}
+
+// Weights of linear interpolation for a marched pixel `offset` cells away, and for those before and after it.
+fn hats(offset: f32) -> vec3f {
+    return max(1.0 - abs(vec3f(-1.0, 0.0, 1.0) + offset), vec3f(0.0));
+}
+
+// Distance of the cloud nearest to the middle of a cell among the nine marched pixels around it, -1 if there is none.
+fn nearest_cloud(cell: vec2i) -> f32 {
+    let subpixel = vec2f(vec2u(frame.subpixel_x, frame.subpixel_y)) + 0.5;
+    var distance = -1.0;
+    var nearest = 1e9;
+    var i = 0;
+    loop {
+        let neighbour = vec2i(i % 3, i / 3) - 1;
+        let offset = vec2f(neighbour) + subpixel / f32(STRIDE) - 0.5;
+        let away = dot(offset, offset);
+        let depth = fresh_depth[fresh_index(cell + neighbour)];
+        if depth >= 0.0 && away < nearest {
+            nearest = away;
+            distance = depth;
+        }
+        if i == 8 {
+            break;
+        }
+        i++;
+    }
+    return distance;
 }
 
 fn fresh_index(cell: vec2i) -> u32 {
@@ -88,34 +163,33 @@ fn fresh_index(cell: vec2i) -> u32 {
 }
 
 fn pixel_index(pixel: vec2i) -> u32 {
-    let inside = vec2u(clamp(pixel, vec2i(0), vec2i(i32(frame.width), i32(frame.height)) - 1));
-    return inside.y * frame.width + inside.x;
-}
-
-fn nearest_index(at: vec2f) -> u32 {
-    return pixel_index(vec2i(floor(at)));
-}
-
-// The history between pixel centres, by Catmull-Rom splines: linear interpolation, repeated every frame, would blur. A
-// pixel that has not moved reads itself, exactly.
-fn history_at(at: vec2f) -> vec4f {
-    let p = at - 0.5;
-    let snapped = select(p, round(p), abs(p - round(p)) < vec2f(1e-3));
-    let corner = vec2i(floor(snapped));
-    let f = snapped - floor(snapped);
-    let x = catmull_rom(f.x);
-    let y = catmull_rom(f.y);
-    var sum = vec4f(0.0);
-    for (var j = 0; j < 4; j++) {
-        for (var i = 0; i < 4; i++) {
-            sum += x[i] * y[j] * history[pixel_index(corner + vec2i(i, j) - 1)];
-        }
+    let size = vec2i(vec2u(frame.width, frame.height));
+    var inside = clamp(pixel, vec2i(0), size - 1);
+    if CAMERA == EQUIRECT {
+        inside.x = (pixel.x % size.x + size.x) % size.x;
     }
-    return sum;
+    return u32(inside.y) * frame.width + u32(inside.x);
 }
 
-fn catmull_rom(f: f32) -> array<f32, 4> {
-    return array<f32, 4>(
+// A row of the frame before, between the pixels across: four values from seven pixels.
+fn history_row(at: vec2i, weights: vec4f) -> mat4x4f {
+    let p0 = history[pixel_index(at)];
+    let p1 = history[pixel_index(at + vec2i(1, 0))];
+    let p2 = history[pixel_index(at + vec2i(2, 0))];
+    let p3 = history[pixel_index(at + vec2i(3, 0))];
+    let p4 = history[pixel_index(at + vec2i(4, 0))];
+    let p5 = history[pixel_index(at + vec2i(5, 0))];
+    let p6 = history[pixel_index(at + vec2i(6, 0))];
+    return mat4x4f(
+        mat4x4f(p0, p1, p2, p3) * weights,
+        mat4x4f(p1, p2, p3, p4) * weights,
+        mat4x4f(p2, p3, p4, p5) * weights,
+        mat4x4f(p3, p4, p5, p6) * weights,
+    );
+}
+
+fn catmull_rom(f: f32) -> vec4f {
+    return vec4f(
         f * (-0.5 + f * (1.0 - 0.5 * f)),
         1.0 + f * f * (-2.5 + 1.5 * f),
         f * (0.5 + f * (2.0 - 1.5 * f)),

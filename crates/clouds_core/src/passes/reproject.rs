@@ -30,37 +30,26 @@ pub(crate) const ORDER: [[u32; 2]; 16] = [
     [0, 3],
 ];
 
-/// What is known of each pixel from the frames so far.
-pub(crate) struct History {
-    pub marched: Marched,
-    /// 1 where a pixel has been marched since the cut, 0 where it is a guess.
-    pub known: wgpu::Buffer,
-}
-
-impl History {
-    pub fn new(gpu: &Gpu, pixels: u64) -> Self {
-        Self { marched: Marched::new(gpu, pixels), known: gpu.buffer("known", 4 * pixels) }
-    }
-}
-
-/// Fills `out` from the `fresh` subset and from the history `before`, for the band of `frame`.
+/// Fills `out` from the `fresh` subset and from the frame `before`, for the band of `frame`.
 pub(crate) fn run(
     gpu: &Gpu,
     work: &mut Work<'_>,
     scene: &Scene<'_>,
     frame: &Frame,
     fresh: &Marched,
-    before: &History,
-    out: &History,
+    before: &Marched,
+    out: &Marched,
 ) -> Result<()> {
     let ours = [
         ("fresh", (&fresh.clouds).into()),
         ("fresh_depth", (&fresh.depth).into()),
-        ("history", (&before.marched.clouds).into()),
-        ("history_depth", (&before.marched.depth).into()),
-        ("history_known", (&before.known).into()),
-        ("known", (&out.known).into()),
+        ("history", (&before.clouds).into()),
+        ("history_depth", (&before.depth).into()),
     ];
-    let bindings = [scene.bindings.as_slice(), &out.marched.bindings(), &ours].concat();
-    work.dispatch(&*gpu.kernel("reproject", "reproject", scene.variant)?, &bindings, [frame.width, frame.rows, 1])
+    let bindings = [scene.bindings.as_slice(), &out.bindings(), &ours].concat();
+    work.dispatch(
+        &*gpu.kernel("reproject", "reproject", scene.variant)?,
+        &bindings,
+        [frame.march_width, frame.rows.div_ceil(STRIDE), 1],
+    )
 }

@@ -36,6 +36,6 @@ impl Sky {
             work.submit(ctx.timings, ctx.interrupt)?;
             Ok((map.create_view(&wgpu::TextureViewDescriptor::default()), light))
         })?;
-        Ok(vec![("sky_map", map.into()), ("sky_light", light.into())])
+        Ok(vec![("sky_map", map.into()), ("sky_light", light.into()), ("sky_light_uniform", light.into())])
     }
 }

@@ -23,16 +23,26 @@ fn optical_depth_to_sun(p: vec3f, opacity: f32, width: f32) -> f32 {
     var depth = 0.0;
     // Behind little cloud the near samples see the detail; the others are cheap.
     let full = select(0u, n, opacity < quality.cheap_light);
-    if LIGHT_DETAIL {
-        for (var i = 0u; i < full; i++) {
+    // Loops are tested at their end: one that is tested at its start runs once more on lavapipe.
+    var i = 0u;
+    if LIGHT_DETAIL && full > 0u {
+        loop {
             let at = light_sample(samples, p, i, width);
             depth += cloud_density_at(at.p, at.altitude, at.width) * at.length;
+            i += 1u;
+            if i >= full {
+                break;
+            }
         }
     }
-    if LIGHT_CHEAP {
-        for (var i = full; i < n + quality.far_sample; i++) {
+    if LIGHT_CHEAP && i < n + quality.far_sample {
+        loop {
             let at = light_sample(samples, p, i, width);
             depth += cloud_density_cheap(at.p, at.altitude, at.width) * at.length;
+            i += 1u;
+            if i >= n + quality.far_sample {
+                break;
+            }
         }
     }
     depth *= frame.extinction;

@@ -142,12 +142,12 @@ fn march_ray(direction: vec3f, offset: f32, within: vec2f) -> Cloud {
     // A loop in a loop, and no branch with much behind it: lavapipe runs both sides of every branch, and skips only loops
     // that none of its eight rays is in. Each ray of a group goes on to its next cloud, and all take the dear part, the
     // light, together; a GPU's rays do likewise. Measured: 2.6 times as fast as one loop of branches.
-    while i < end {
+    loop {
         var at: Sample;
         var column: Column;
         var shape = 0.0;
         // On to the next cloud: big steps with cheap samples outside, back by what was leapt over on a hit.
-        while i < end && shape <= 0.0 {
+        loop {
             at = march_sample(stretches, steps, direction, offset, i, pixel_size);
             column = cloud_column(at.p, at.altitude);
             shape = cloud_shape(column, at.width);
@@ -161,6 +161,9 @@ fn march_ray(direction: vec3f, offset: f32, within: vec2f) -> Cloud {
                 let back = max(i - min(i, big - 1u), seen);
                 shape = select(0.0, shape, back == i);
                 i = back;
+            }
+            if i >= end || !(shape <= 0.0) {
+                break;
             }
         }
         // Not "shape > 0": with that, a NaN would stand still for ever.
@@ -187,6 +190,10 @@ fn march_ray(direction: vec3f, offset: f32, within: vec2f) -> Cloud {
                     i = end;
                 }
             }
+        }
+        // Tested at their end, loops run once less on lavapipe: a fifth of the time.
+        if i >= end {
+            break;
         }
     }
     if sum.weight <= 0.0 {

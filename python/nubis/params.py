@@ -378,7 +378,7 @@ class Quality(Block):
     cone: float = 0.0
     cheap_light: float = 1.0
     min_transmittance: float = 0.01
-    contrast: float = 0.1
+    contrast: float = 0.2
     jitter: bool = True
     view_distance: float = 400000.0
     tolerance: float = 0.0

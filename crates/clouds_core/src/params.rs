@@ -224,7 +224,7 @@ params! {
         /// Largest contrast between neighbouring rays, past which the pixels between them get rays of their own. Of pixels
         /// less than an eighth of a degree wide one in sixteen is marched first, of a quarter one in four, of wider ones
         /// every one; 0 marches every one of any width.
-        contrast: f32 = 0.1, in 0..=1 "";
+        contrast: f32 = 0.2, in 0..=1 "";
         /// Whether each ray starts at a blue-noise offset of up to one step.
         jitter: bool = true;
         /// Farthest distance at which clouds are marched.
@@ -319,11 +319,12 @@ impl Quality {
         Ok(match name {
             "balanced" => balanced,
             "draft" => Self {
-                steps_zenith: 40,
-                steps_horizon: 96,
+                steps_zenith: 54,
+                steps_horizon: 128,
                 light_steps: 5,
                 cheap_light: 0.0,
-                contrast: 0.3,
+                min_transmittance: 0.03,
+                contrast: 0.5,
                 path_samples: 16,
                 ..balanced
             },

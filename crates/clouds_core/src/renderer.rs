@@ -551,7 +551,7 @@ impl World {
         let noise = self.noise.insert(Noise::run(&mut ctx, params)?); // once for a seed
         let weather = self.weather.run(&mut ctx, params)?; // when its block changes
         let high_clouds = self.high_clouds.run(&mut ctx, params, frame)?; // as they evolve
-        let sky = self.sky.run(&mut ctx, params, frame)?; // when sun, air or altitude change
+        let sky = self.sky.run(&mut ctx, params, frame, at.0)?; // when sun or air change, or the eye has gone far
 
         let volume = self.volume.run(&ctx, params)?; // once for a grid
 

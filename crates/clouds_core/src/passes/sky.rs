@@ -1,7 +1,10 @@
 //! The sky around the camera, and the light that it and the sun give to the clouds.
 
+use glam::DVec3;
+
 use super::weather::bake_map;
 use super::{Baked, Bindings, Context};
+use crate::camera::Camera;
 use crate::error::Result;
 use crate::frame::Frame;
 use crate::params::{self, Params};
@@ -9,8 +12,22 @@ use crate::params::{self, Params};
 /// Texels of the sky map: azimuth from the sun, angle from the horizon.
 const SIZE: [u32; 3] = [128, 160, 1];
 
-/// What the sky is made from: sun, air, where the eye is, and where the clouds are that it lights.
-type Key = (params::Sun, params::Atmosphere, f32, [f32; 3], [f32; 3]);
+/// What the sky is made from: sun, air, where it is seen from, and where the clouds are that it lights.
+type Key = (params::Sun, params::Atmosphere, [f64; 3], [f32; 3]);
+
+/// Where the sky is seen from, near the eye: the same place for all eyes around it, so that one that flies has a new sky
+/// every few metres of height or hundreds of metres of way, not in every frame. What that costs: half a percent of the
+/// height, by which the air dims by less than that, and a hundredth of a degree of the sun's elevation.
+fn viewpoint(eye: DVec3, params: &Params) -> DVec3 {
+    let radius = f64::from(params.atmosphere.planet_radius);
+    let centre = DVec3::new(0.0, 0.0, -radius);
+    let height = (eye - centre).length() - radius;
+    let steps = ((1.0 + height.abs() / 100.0).ln() * 100.0).round();
+    let height = 100.0 * ((steps / 100.0).exp() - 1.0) * height.signum();
+    let step = 1e-4 * radius;
+    let place = (eye / step).round() * step - centre;
+    centre + place.try_normalize().unwrap_or(DVec3::Z) * (radius + height)
+}
 
 /// The sky on the GPU.
 pub(crate) struct Sky {
@@ -22,10 +39,18 @@ impl Sky {
         Self { made: Baked::new() }
     }
 
-    pub fn run(&mut self, ctx: &mut Context<'_>, params: &Params, frame: &Frame) -> Result<Bindings<'_>> {
+    pub fn run(
+        &mut self,
+        ctx: &mut Context<'_>,
+        params: &Params,
+        frame: &Frame,
+        eye: DVec3,
+    ) -> Result<Bindings<'_>> {
         let layers = [params.clouds.base, params.clouds.top, params.high_clouds.altitude];
-        let key = (params.sun.clone(), params.atmosphere.clone(), frame.altitude, frame.zenith, layers);
+        let from = viewpoint(eye, params);
+        let key = (params.sun.clone(), params.atmosphere.clone(), from.to_array(), layers);
         let (map, light) = self.made.get(key, || {
+            ctx.uniforms.upload_frame(ctx.gpu, &Frame::new(&Camera::equirect(from)?, params, 0.0, [1, 1]));
             let map = ctx.gpu.texture("sky", SIZE, 1);
             bake_map(ctx, "sky", "sky_map_bake", &map)?;
             let light = ctx.gpu.buffer("sky_light", 64);
@@ -34,6 +59,7 @@ impl Sky {
             let mut work = ctx.gpu.work();
             work.dispatch(&*ctx.gpu.kernel("sky", "sky_light_bake", ctx.variant)?, &bindings, [64, 1, 1])?;
             work.submit(ctx.timings, ctx.interrupt)?;
+            ctx.uniforms.upload_frame(ctx.gpu, frame);
             Ok((map.create_view(&wgpu::TextureViewDescriptor::default()), light))
         })?;
         Ok(vec![("sky_map", map.into()), ("sky_light", light.into()), ("sky_light_uniform", light.into())])

@@ -57,6 +57,8 @@ params! {
         camera_kind: u32 = 0;
         /// 1 where there are high clouds, for which `composite` is compiled.
         high_clouds: u32 = 0;
+        /// 1 where nothing has been marched, as there are no clouds, for which `composite` is compiled.
+        cloudless: u32 = 0;
         /// Tangent of half the vertical field of view.
         tan_half_fov: f32 = 1.0;
         /// Half the field of view of a fisheye in radians.

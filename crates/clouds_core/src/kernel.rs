@@ -50,6 +50,8 @@ pub(crate) struct Variant {
     pub camera: u32,
     /// Whether there are high clouds, for `composite`.
     pub high: bool,
+    /// Whether nothing has been marched, for `composite`.
+    pub cloudless: bool,
     /// Whether the sky and the depth are asked for, for `composite`.
     pub layers: bool,
 }
@@ -69,6 +71,7 @@ impl Variant {
             // What single passes ask for beside.
             camera: 0,
             high: false,
+            cloudless: false,
             layers: false,
         }
     }
@@ -83,7 +86,7 @@ impl Variant {
         Self { sunlit: frame.sunlit(params), camera: frame.camera_kind, ..Self::new(params, quality) }
     }
 
-    fn constants(self) -> [(&'static str, f64); 10] {
+    fn constants(self) -> [(&'static str, f64); 11] {
         let switch = |on| f64::from(u8::from(on));
         [
             ("MODEL", f64::from(self.model as u32)),
@@ -95,6 +98,7 @@ impl Variant {
             ("LIGHT_CHEAP", switch(self.light_cheap)),
             ("CAMERA", f64::from(self.camera)),
             ("HIGH", switch(self.high)),
+            ("CLOUDLESS", switch(self.cloudless)),
             ("LAYERS", switch(self.layers)),
         ]
     }

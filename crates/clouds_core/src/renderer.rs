@@ -211,6 +211,7 @@ impl Renderer {
         frame.background = u32::from(background);
         frame.first_sample = first_sample;
         let method = Method::new(params, &self.quality);
+        frame.cloudless = u32::from(params.volume.is_none() && params.clouds.coverage == 0.0 && method == Method::March);
         let Self { gpu, world, quality, timings, .. } = self;
         let variant = Variant::of_frame(params, quality, &frame);
         let scene = gpu.compiling(&method.kernels(quality, &frame, variant, all), || {
@@ -235,6 +236,11 @@ impl Renderer {
             match (method, &still.rays) {
                 (Method::Reference, Some(rays)) => reference::run(&mut ctx, &scene, &frame, rays, &still.marched)?,
                 (Method::Path, Some(rays)) => path::run(&mut ctx, &scene, &frame, rays, &still.marched)?,
+                _ if frame.cloudless > 0 => {
+                    let mut work = gpu.work();
+                    work.clear(&still.marched.samples);
+                    work.submit(ctx.timings, interrupt)?;
+                }
                 _ => {
                     let pace = &mut self.march_pace;
                     march_sheet(&mut ctx, &scene, &mut frame, quality, pace, &still.refined, &still.marched)?;

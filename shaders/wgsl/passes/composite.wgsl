@@ -6,6 +6,7 @@
 #import high_layer
 
 override HIGH: bool = true; // there are high clouds
+override CLOUDLESS: bool = false; // nothing has been marched
 override LAYERS: bool = true; // the sky and the depth are asked for
 
 // The sun's angular radius, 0.2666 degrees (IAU: 695 700 km at 1 au).
@@ -41,8 +42,11 @@ fn composite(@builtin(global_invocation_id) id: vec3u) {
     let ground = hit_sphere(direction, frame.power_ground);
     let air = Air(sky_radiance(direction), whole_air(direction, ground));
 
-    let cloud = clouds[index];
-    let here = Layer(cloud.rgb, cloud.a, max(cloud_depth[index], 0.0));
+    var here = Layer(vec3f(0.0), 1.0, 0.0);
+    if !CLOUDLESS {
+        let cloud = clouds[index];
+        here = Layer(cloud.rgb, cloud.a, max(cloud_depth[index], 0.0));
+    }
     var seen = through_air(here, altitude_at(here.distance * direction), air);
     if HIGH {
         // The high clouds where the ray enters their sphere, which it cannot from inside, and where it leaves it; each

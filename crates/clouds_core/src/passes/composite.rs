@@ -45,5 +45,5 @@ pub(crate) fn run(
 
 /// What it is made for.
 pub(crate) fn variant(of: Variant, frame: &Frame, layers: bool) -> Variant {
-    Variant { high: frame.high_clouds > 0, layers, ..of }
+    Variant { high: frame.high_clouds > 0, cloudless: frame.cloudless > 0, layers, ..of }
 }

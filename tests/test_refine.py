@@ -11,7 +11,7 @@ BARE = {"atmosphere.aerial_perspective": 0.0, "high_clouds.coverage": 0.0}
 
 
 def layers(size, contrast, scene="fair_weather", quality="balanced", **changes):
-    """A part of a scene: pixels of a tenth of a degree, of which one in sixteen is marched first."""
+    """A part of a scene: pixels of a tenth of a degree, one in sixteen of which comes first."""
     eye = nubis.scenes[scene][0].eye
     target = np.add(eye, (0.3, 1.0, -0.2 if scene == "above" else 0.25))
     camera = nubis.Camera.look_at(eye, target, (0, 0, 1), min(0.1 * size[1], 60.0))
@@ -80,7 +80,9 @@ def test_it_does_what_its_twin_does(contrast):
 
 @pytest.mark.parametrize("scene", ["fair_weather", "overcast", "storm", "above", "in_cloud"])
 def test_it_costs_little_error(scene):
-    """Against a ray for every pixel: 9 % of the mean radiance, 0.02 of the transmittance, no bias past 1 %."""
+    """Against a ray for every pixel: 9 % of the mean radiance, 0.03 of the transmittance, no bias
+    past 1 %.
+    """
     size = 320, 180
     full, few = (layers(size, contrast, scene, "draft") for contrast in (0.0, 0.1))
     seen = full["transmittance"] < 0.999

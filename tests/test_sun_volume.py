@@ -54,7 +54,7 @@ def test_on_is_off(scene, most):
 
 
 def test_it_follows_from_the_picture_alone():
-    """The same bytes whatever has been rendered before: the volume stays while eye and clouds move a little."""
+    """The same bytes whatever has been rendered before, though the volume stays for a while."""
     camera, params = nubis.scenes["fair_weather"]
     used = nubis.Renderer(32, 18, quality=BAKED)
     for eye, time in [

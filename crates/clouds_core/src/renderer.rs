@@ -211,7 +211,8 @@ impl Renderer {
         frame.background = u32::from(background);
         frame.first_sample = first_sample;
         let method = Method::new(params, &self.quality);
-        frame.cloudless = u32::from(params.volume.is_none() && params.clouds.coverage == 0.0 && method == Method::March);
+        frame.cloudless =
+            u32::from(params.volume.is_none() && params.clouds.coverage == 0.0 && method == Method::March);
         let Self { gpu, world, quality, timings, .. } = self;
         let variant = Variant::of_frame(params, quality, &frame);
         let scene = gpu.compiling(&method.kernels(quality, &frame, variant, all), || {
@@ -539,7 +540,8 @@ impl World {
         }
     }
 
-    /// Uploads the uniforms and bakes what has changed.
+    /// Uploads the uniforms and bakes what has changed, as seen from a place at a time.
+    #[expect(clippy::too_many_arguments, reason = "what a scene depends on")]
     fn run(
         &mut self,
         gpu: &Gpu,

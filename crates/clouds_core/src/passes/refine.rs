@@ -26,7 +26,11 @@ pub(crate) struct Refined {
 
 impl Refined {
     pub fn new(gpu: &Gpu, pixels: u64) -> Self {
-        Self { list: gpu.buffer("active_rays", 4 * pixels), count: gpu.buffer("ray_count", 4), span: gpu.buffer("cloud_span", 8 * pixels) }
+        Self {
+            list: gpu.buffer("active_rays", 4 * pixels),
+            count: gpu.buffer("ray_count", 4),
+            span: gpu.buffer("cloud_span", 8 * pixels),
+        }
     }
 
     pub fn bindings(&self) -> Bindings<'_> {
@@ -43,8 +47,9 @@ impl Refined {
             let last = size - 1;
             (0..last).step_by(frame.lattice as usize).chain([last])
         };
-        let lattice: Vec<u32> =
-            along(frame.sheet_rows).flat_map(|y| along(frame.march_width).map(move |x| y * frame.march_width + x)).collect();
+        let lattice: Vec<u32> = along(frame.sheet_rows)
+            .flat_map(|y| along(frame.march_width).map(move |x| y * frame.march_width + x))
+            .collect();
         gpu.queue.write_buffer(&self.list, 0, bytemuck::cast_slice(&lattice));
         lattice.len() as u32
     }

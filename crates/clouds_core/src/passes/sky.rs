@@ -39,13 +39,7 @@ impl Sky {
         Self { made: Baked::new() }
     }
 
-    pub fn run(
-        &mut self,
-        ctx: &mut Context<'_>,
-        params: &Params,
-        frame: &Frame,
-        eye: DVec3,
-    ) -> Result<Bindings<'_>> {
+    pub fn run(&mut self, ctx: &mut Context<'_>, params: &Params, frame: &Frame, eye: DVec3) -> Result<Bindings<'_>> {
         let layers = [params.clouds.base, params.clouds.top, params.high_clouds.altitude];
         let from = viewpoint(eye, params);
         let key = (params.sun.clone(), params.atmosphere.clone(), from.to_array(), layers);

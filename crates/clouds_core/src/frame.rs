@@ -293,9 +293,10 @@ impl Frame {
         self.high_origin = plane(at, high.scale);
         self.high_broad_origin = plane(at, HIGH_BROAD * high.scale);
         self.high_direction = along.as_vec2().to_array();
-        // In steps of a 64th of the smallest octave's life, which nobody sees: a new texture in every frame would.
-        let step = 1.0 / (64.0 * f64::from(high.evolution) * f64::from(1u32 << (high.octaves - 1)));
-        let time = if step.is_finite() { (time / step).floor() * step } else { time };
+        // In steps of a 512th of the smallest octave's life, which change no pixel by more than two thousandths: a new
+        // texture in every frame would take longer than all else that is baked.
+        let step = 1.0 / (512.0 * f64::from(high.evolution) * f64::from(1u32 << (high.octaves - 1)));
+        let time = if step.is_finite() { (time / step).round() * step } else { time };
         for octave in 0..8 {
             let updates = time * f64::from(high.evolution) * f64::from(1u32 << octave);
             // Update numbers come round after 65,536, exact in f32 (passes/high_clouds.wgsl).

@@ -561,13 +561,13 @@ impl World {
         let high_clouds = self.high_clouds.run(&mut ctx, params, frame)?; // as they evolve
         let sky = self.sky.run(&mut ctx, params, frame, at.0)?; // when sun or air change, or the eye has gone far
 
+        ctx.variant = variant; // those so far know no picture
         let volume = self.volume.run(&ctx, params)?; // once for a grid
 
         let blue_noise = vec![("blue_noise", (&self.blue_noise).into())];
         let uniforms = self.uniforms.bindings();
         let mut bindings: Bindings<'_> =
             [uniforms, noise.bindings(), weather, high_clouds, sky, volume, blue_noise].concat();
-        ctx.variant = variant;
         let majorants = self.majorants.run(&mut ctx, params, &bindings)?; // when paths are traced
         bindings.extend(majorants);
         let sun_volume = self.sun_volume.run(&mut ctx, params, frame, at, &bindings)?; // as clouds and eye move

@@ -19,8 +19,8 @@ fn refine(@builtin(global_invocation_id) id: vec3u) {
     if !any(has) {
         return;
     }
-    // Of the squares above and to the left; on the rim the square itself again.
-    let before = select(low - frame.lattice, low, low < vec2u(frame.lattice));
+    // Of the squares above and to the left, which may be narrower behind the last column and row; on the rim the square itself.
+    let before = (max(low, vec2u(1u)) - 1u) / frame.lattice * frame.lattice;
 
     let a = read(low);
     let b = read(vec2u(high.x, low.y));

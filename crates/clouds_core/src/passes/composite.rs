@@ -1,7 +1,7 @@
 //! The clouds before the sky: what the caller gets.
 
-use super::Scene;
 use super::march::Marched;
+use super::{Bindings, Scene};
 use crate::error::Result;
 use crate::frame::Frame;
 use crate::gpu::{Gpu, Work};
@@ -24,6 +24,10 @@ impl Composed {
             depth: gpu.buffer("depth", 4 * pixels),
         }
     }
+
+    pub fn bindings(&self) -> Bindings<'_> {
+        vec![("image", (&self.image).into()), ("sky", (&self.sky).into()), ("depth", (&self.depth).into())]
+    }
 }
 
 /// Composes the band of `frame`.
@@ -35,7 +39,6 @@ pub(crate) fn run(
     marched: &Marched,
     out: &Composed,
 ) -> Result<()> {
-    let ours = [("image", (&out.image).into()), ("sky", (&out.sky).into()), ("depth", (&out.depth).into())];
-    let bindings = [scene.bindings.as_slice(), &marched.bindings(), &ours].concat();
+    let bindings = [scene.bindings.as_slice(), &marched.bindings(), &out.bindings()].concat();
     work.dispatch(&*gpu.kernel("composite", "composite", scene.variant)?, &bindings, [frame.width, frame.rows, 1])
 }

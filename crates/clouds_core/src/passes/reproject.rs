@@ -1,7 +1,7 @@
 //! Temporal reprojection: one pixel in sixteen is marched, the others come from the frame before.
 
-use super::Scene;
 use super::march::Marched;
+use super::{Bindings, Scene};
 use crate::error::Result;
 use crate::frame::Frame;
 use crate::gpu::{Gpu, Work};
@@ -40,6 +40,10 @@ pub(crate) struct History {
 impl History {
     pub fn new(gpu: &Gpu, pixels: u64) -> Self {
         Self { marched: Marched::new(gpu, pixels), known: gpu.buffer("known", 4 * pixels) }
+    }
+
+    pub fn bindings(&self) -> Bindings<'_> {
+        [self.marched.bindings(), vec![("known", (&self.known).into())]].concat()
     }
 }
 

@@ -12,7 +12,7 @@ export VIRTUAL_ENV := $(CURDIR)/$(VENV)
 unexport CONDA_PREFIX
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help setup build generate render gallery test stress types lint bench bench-kernels soak clean
+.PHONY: help setup build generate render gallery test stress types lint bench bench-kernels heat profile soak clean
 
 help: ## List the commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -87,6 +87,12 @@ bench: build $(VENV)/bench ## Measure error against time into benchmarks/results
 
 bench-kernels: setup ## Time a small frame and each of its kernels (NUBIS_ADAPTER chooses the adapter)
 	cargo bench --bench frame
+
+heat: build $(VENV)/bench ## Count what each pixel costs into benchmarks/results, docs/speed.md
+	$(BIN)/python -m benchmarks.heat
+
+profile: build $(VENV)/bench ## Time the passes of a frame, its reads and its memory into docs/speed.md
+	$(BIN)/python -m benchmarks.profile
 
 soak: build $(VENV)/bench ## Render 10 000 animated frames and look for drift and growth
 	$(BIN)/python -m benchmarks.soak

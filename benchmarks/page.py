@@ -1,4 +1,7 @@
-"""Writes the results into docs/accuracy.md, between markers: tables, and all prose with numbers."""
+"""Writes the results into docs/accuracy.md and docs/speed.md, between markers.
+
+Tables, and all prose with numbers.
+"""
 
 from __future__ import annotations
 
@@ -15,6 +18,7 @@ from benchmarks.plots import geometric_mean, is_preset, pareto
 from benchmarks.shapes import fit
 
 PAGE = Path(__file__).parents[1] / "docs" / "accuracy.md"
+SPEED = PAGE.with_name("speed.md")
 
 
 def write(folder: Path, page: Path = PAGE) -> None:
@@ -38,9 +42,24 @@ def write(folder: Path, page: Path = PAGE) -> None:
         blocks["oracle"] = _oracle(oracle)
     if (soak := _read(folder, "soak.json")) is not None:
         blocks["soak"] = _soak(soak) + "\n\n" + _image(folder, page, "soak")
+    page.write_text(_filled(text, blocks))
+
+
+def write_speed(folder: Path, page: Path = SPEED) -> None:
+    """The same for docs/speed.md."""
+    blocks = {}
+    if (found := _read(folder, "profile.json")) is not None:
+        blocks["profile"] = _about(found["header"]) + _load(found) + "\n\n" + profile(found)
+        blocks["memory"] = memory(found)
+    if (heat := _read(folder, "heat.json")) is not None:
+        blocks["heat"] = _heat(heat) + "\n\n" + _image(folder, page, "heat")
+    page.write_text(_filled(page.read_text(), blocks))
+
+
+def _filled(text: str, blocks: dict[str, str]) -> str:
     for name, block in blocks.items():
         text = fill(text, name, block)
-    page.write_text(text)
+    return text
 
 
 def fill(text: str, name: str, block: str) -> str:
@@ -459,4 +478,96 @@ def _soak(soak: Row) -> str:
         f"{soak['held_frames']} frames, {held} (relative RMSE "
         f"{_percent(soak['held_rel_rmse'])}). Memory: {half[1]:.0f} MiB at frame {half[0]}, "
         f"{memory[-1][1]:.0f} MiB at the end, {growth:+.2f} MiB a 1000 frames over the second half."
+    )
+
+
+def _load(found: Row) -> str:
+    text = f" The fastest of {found['header']['frames']} frames."
+    if found["load"] is not None:
+        text += f" Load average at the start: {found['load']:.1f}."
+    return text
+
+
+def profile(found: Row) -> str:
+    """Tables of the frames: passes, and the reads of the march at the price of reads alone."""
+    pixels = found["header"]["size"][0] * found["header"]["size"][1]
+    software = found["header"]["adapter"]["kind"] == "cpu"
+    clock = "processor" if software else "device"
+    return "\n\n".join(_frame(f, found["read_ns"], pixels, clock) for f in found["frames"])
+
+
+def _frame(frame: Row, read_ns: dict[str, float] | None, pixels: int, clock: str) -> str:
+    wall, passes = frame["ms"], frame["passes_ms"]
+    rest = {"not in a pass: copies, waiting": wall - sum(passes.values())} if passes else {}
+    lines = [
+        (name, f"{ms:.1f}", f"{100 * ms / wall:.1f} %")
+        for name, ms in [*passes.items(), *rest.items(), ("the frame, by the clock", wall)]
+    ]
+    bakes = ", ".join(f"{name} {ms:.1f}" for name, ms in frame["bakes_ms"].items()) or "none"
+    parts = [
+        f"`{frame['scene']}`, `{frame['quality']}`; the first picture took "
+        f"{frame['first_ms']:.0f} ms, of which bakes: {bakes}.",
+        _table(["pass", "ms", "share of the frame"], lines),
+    ]
+    evaluations, march = frame["evaluations"], frame["march_ms"]
+    counted = f"Density evaluations a pixel: {evaluations:.1f}"
+    if march and evaluations:
+        counted += (
+            f", {1e6 * march / evaluations / pixels:.1f} ns each of the march's {march:.0f} ms of "
+            f"{clock} time"
+        )
+    parts.append(counted + ".")
+    reads = {name: n for name, n in frame["reads"].items() if n}
+    lines = []
+    ceiling = 0.0
+    for name, n in reads.items():
+        price, ms = "–", "–"
+        if read_ns is not None:
+            cost = 1e-6 * n * pixels * read_ns[name]
+            ceiling += cost
+            price, ms = f"{read_ns[name]:.2f}", f"{cost:.1f}"
+        lines.append((f"`{name}`", f"{n:.1f}", price, ms))
+    total = f"{ceiling:.1f}" if read_ns is not None else "–"
+    lines.append(("all", f"{sum(reads.values()):.1f}", "", total))
+    parts.append(_table(["texture", "reads a pixel", "ns a read", f"{clock} ms a frame"], lines))
+    if march and ceiling:
+        parts.append(
+            f"Its reads alone would take {100 * ceiling / march:.0f} % of the {clock} time of the "
+            "march."
+        )
+    return "\n\n".join(parts)
+
+
+def memory(found: Row) -> str:
+    """What a renderer holds on the GPU after the first of the frames."""
+    held = found["frames"][0]["memory"]
+    width, height = found["header"]["size"]
+    lines = [(f"`{name}`", owner, _bytes(size)) for owner, name, size in held]
+    total = {o: sum(size for owner, _, size in held if owner == o) for o in ("scene", "still")}
+    volume = sum(s for owner, n, s in found["memory_with_sun_volume"] if owner == "scene")
+    return (
+        _table(["texture or buffer", "of", "bytes"], lines)
+        + f"\n\nWhat every picture reads (scene): {_megabytes(total['scene'])}, with the sun "
+        f"volume {_megabytes(volume)}. Buffers of the frame itself (still) at {width}×{height}: "
+        f"{_megabytes(total['still'])}."
+    )
+
+
+def _bytes(size: int) -> str:
+    return f"{size:,}".replace(",", " ")
+
+
+def _megabytes(size: int) -> str:
+    return f"{size / 1e6:.1f} MB"
+
+
+def _heat(heat: Row) -> str:
+    lines = [
+        (row["stage"], f"{row['reads']:.1f}", f"{100 * row['share']:.2f} %", str(row["most"]))
+        for row in heat["rows"]
+    ]
+    return (
+        _about(heat["header"])
+        + f" Scene: `{heat['header']['scene']}`; white is {heat['white']} reads or more.\n\n"
+        + _table(["stage", "reads a pixel", "share of the first", "most in a pixel"], lines)
     )

@@ -4,13 +4,26 @@ import csv
 import json
 import math
 from importlib.util import find_spec
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 import nubis
 from benchmarks import __main__ as command
-from benchmarks import measure, methods, metrics, page, plots, reference, shapes, soak
+from benchmarks import (
+    counts,
+    heat,
+    measure,
+    methods,
+    metrics,
+    page,
+    plots,
+    profile,
+    reference,
+    shapes,
+    soak,
+)
 
 
 def layers(radiance, transmittance, sky=0.0):
@@ -245,3 +258,167 @@ def test_soak_sees_faults():
     }
     for name, value in bad.items():
         assert len(soak.faults(good | {name: value})) == 1
+
+
+FAIR = nubis.scenes["fair_weather"]
+
+
+@pytest.fixture(scope="module")
+def panels():
+    return {panel.name: panel.reads for panel in heat.panels(*FAIR, (64, 36))}
+
+
+def test_reads_are_counted():
+    """Each texture by itself, all together, and the light samples by what they must read."""
+    camera, params = FAIR
+    night = params.with_(**{"sun.irradiance": (0.0, 0.0, 0.0)})
+    quality = nubis.quality("thesis2018")
+    kinds = "evaluations", "reads", *counts.TEXTURES
+    jobs = [counts.Job(camera, sky, quality, kind) for sky in (params, night) for kind in kinds]
+    found = counts.count(jobs, (48, 27))
+    day = dict(zip(kinds, found[: len(kinds)], strict=True))
+    dark = dict(zip(kinds, found[len(kinds) :], strict=True))
+    plain = nubis.Renderer(48, 27, quality=quality).render_layers(camera, params)
+    assert (day["evaluations"] == plain["samples"]).all() and plain["samples"].any()
+    assert (day["reads"] == sum(day[name] for name in counts.TEXTURES)).all()
+    assert (day["weather_map"] == day["evaluations"]).all()
+    assert (day["shape_noise"] == day["evaluations"]).all()
+    assert (day["curl_noise"] == day["detail_noise"]).all() and not day["sun_volume"].any()
+    # Five full light samples and a far one of half the reads at each lit step.
+    lit = (day["evaluations"] - dark["evaluations"]) / 6
+    assert lit.any() and (day["reads"] - dark["reads"] == 22 * lit).all()
+
+
+def test_only_the_march_is_counted():
+    path = FAIR[1].with_(**{"light.model": "path"})
+    with pytest.raises(ValueError, match="march"):
+        counts.count([counts.Job(FAIR[0], path, nubis.quality("draft"), "reads")], (8, 8))
+
+
+def test_what_counts_is_known(tmp_path, monkeypatch):
+    """A read that is new in the shaders must be counted, or nothing is."""
+    source = tmp_path / "source"
+    counts.counting_shaders(source)
+    path = source / "density.wgsl"
+    with path.open("a") as file:
+        file.write("fn more() -> vec4f { return textureSampleLevel(high_map, repeat_sampler, ")
+        file.write("vec2f(0.0), 0.0); }\n")
+    monkeypatch.setenv("NUBIS_SHADERS", str(source))
+    with pytest.raises(ValueError, match="high_map"):
+        counts.counting_shaders(tmp_path / "copy")
+
+
+def test_no_optimisation_in_closed_form(panels):
+    """Every step of a ray reads 4 texels for itself and 22 for its light: 64 steps straight up,
+    128 toward the horizon.
+    """
+    camera, _ = FAIR
+    width, height = 64, 36
+    top = math.tan(math.radians(camera.fov) / 2)
+    x, y = np.meshgrid(
+        ((np.arange(width) + 0.5) / width * 2 - 1) * top * width / height,
+        (1 - (np.arange(height) + 0.5) / height * 2) * top,
+    )
+    rays = np.asarray(camera.forward) + x[..., None] * camera.right + y[..., None] * camera.up
+    up = rays[..., 2] / np.linalg.norm(rays, axis=-1)
+    steps = 128 - 64 * up
+    reads = panels["no optimisation"]
+    assert (np.abs(reads / 26 - steps)[up > 0.01] <= 0.501).all()
+    assert (reads[up < -0.01] == 0).all() and (up > 0.01).any()
+
+
+def test_no_optimisation_costs_more(panels):
+    """At no pixel for those of the thesis but the last, whose steps back may, and in the mean."""
+    names = list(panels)
+    *exact, big = pairwise(names[:5])
+    for before, after in exact:
+        assert (panels[after] <= panels[before]).all(), after
+        assert panels[after].mean() < panels[before].mean(), after
+    assert panels[big[1]].mean() < panels[big[0]].mean()
+    for name in "draft", "balanced":
+        all_rays, some, volume = (panels[n].mean() for n in names if n.startswith(name))
+        assert volume < some < all_rays
+        assert (panels[name] == 0).mean() > (panels[f"{name}, a ray for each pixel"] == 0).mean()
+
+
+@pytest.mark.skipif(not find_spec("matplotlib"), reason="the extra `bench` is not installed")
+def test_heat_results(panels, tmp_path, monkeypatch):
+    found = [heat.Panel(name, reads) for name, reads in panels.items()]
+    monkeypatch.setattr(heat, "panels", lambda *_: found)
+    heat.main(["--size", "64x36", "--out", str(tmp_path)])
+    results = json.loads((tmp_path / "heat.json").read_text())
+    first, *others = results["rows"]
+    assert first["share"] == 1 and all(0 < row["share"] < 1 for row in others)
+    assert [row["stage"] for row in results["rows"]] == list(panels)
+    assert (tmp_path / "plots" / "heat.png").stat().st_size > 10_000
+    copy = tmp_path / "speed.md"
+    copy.write_text(page.SPEED.read_text())
+    page.write_speed(tmp_path, copy)
+    assert f"| no optimisation | {first['reads']:.1f} | 100.00 % |" in copy.read_text()
+
+
+def cells(table):
+    """The cells of a table's lines, below its head."""
+    lines = [line.strip("|").split("|") for line in table.splitlines() if line.startswith("|")]
+    return [[cell.strip() for cell in line] for line in lines[2:]]
+
+
+def test_profile(tmp_path, capsys):
+    path = tmp_path / "profile.json"
+    profile.main(["--size", "64x36", "--repeats", "1", "--out", str(path)])
+    found = json.loads(path.read_text())
+    (frame,) = found["frames"]
+    passes, reads, memory = (cells(t) for t in capsys.readouterr().out.split("\n\n") if "---:" in t)
+    *parts, (whole, ms, share) = passes
+    assert whole == "the frame, by the clock" and share == "100.0 %"
+    assert sum(float(row[1]) for row in parts) == pytest.approx(float(ms), abs=0.3)
+    assert sum(float(row[2].strip(" %")) for row in parts) == pytest.approx(100, abs=0.3)
+    assert {"march_list", "refine", "composite"} <= {row[0] for row in passes}
+    assert found["read_ns"].keys() == set(counts.TEXTURES)
+    assert all(price > 0 for price in found["read_ns"].values()) and frame["march_ms"] > 0
+    *textures, total = reads
+    assert sum(float(row[1]) for row in textures) == pytest.approx(float(total[1]), abs=0.3)
+    evaluations = nubis.Renderer(64, 36).render_layers(*FAIR)["samples"].mean()
+    assert frame["evaluations"] == pytest.approx(evaluations)
+    assert [row[1] for row in memory] == [owner for owner, _, _ in frame["memory"]]
+    assert sum(int(row[2].replace(" ", "")) for row in memory) == sum(m[2] for m in frame["memory"])
+
+
+def test_a_frame_without_timestamps():
+    """What is not known is left out."""
+    frame = {
+        "scene": "x", "quality": "draft", "ms": 2.0, "first_ms": 3.0, "passes_ms": {},
+        "march_ms": 0, "bakes_ms": {}, "evaluations": 5.0,
+        "reads": {"weather_map": 5.0, "sun_volume": 0.0},
+    }  # fmt: skip
+    header = {"size": [8, 8], "adapter": {"kind": "discrete"}}
+    text = page.profile({"header": header, "read_ns": None, "frames": [frame]})
+    assert "| `weather_map` | 5.0 | – | – |" in text and "sun_volume" not in text
+    assert "ns each" not in text and "would take" not in text
+
+
+def held(renderer, owner):
+    return {name: size for o, name, size in renderer._core.memory() if o == owner}
+
+
+@pytest.mark.parametrize("sun_volume", [False, True])
+def test_memory(sun_volume):
+    """What every picture reads is under 64 MB; what grows with the picture is counted apart."""
+    quality = nubis.quality("balanced").replace(sun_volume=sun_volume)
+    renderer = nubis.Renderer(96, 54, quality=quality)
+    assert renderer._core.memory() == []
+    renderer.render(*FAIR)
+    scene, still = held(renderer, "scene"), held(renderer, "still")
+    assert sum(scene.values()) < 64e6
+    # Four half floats a texel, and mips.
+    assert scene["shape_noise"] == 8 * sum((128 >> mip) ** 3 for mip in range(8))
+    assert scene["weather_map"] == 8 * 512**2
+    assert scene["sun_volume"] == (8 * 96 * 96 * 144 if sun_volume else 8)
+    bytes_a_pixel = {"clouds": 16, "image": 16, "sky": 16, "cloud_span": 8}
+    bytes_a_pixel |= {n: 4 for n in ("cloud_depth", "samples", "active_rays", "depth")}
+    assert still == {n: 96 * 54 * b for n, b in bytes_a_pixel.items()} | {"ray_count": 16}
+    bigger = nubis.Renderer(192, 108, quality=quality)
+    bigger.render(*FAIR)
+    assert held(bigger, "scene") == scene and held(bigger, "still")["sky"] == 4 * still["sky"]
+    next(renderer.animate([(*FAIR, 0.0)]))
+    assert held(renderer, "animation")["known"] == 4 * 96 * 54

@@ -8,7 +8,8 @@ import OpenEXR
 import pytest
 
 import nubis
-from nubis import FileError, ParameterError, to_srgb8
+from nubis import FileError, ParameterError, _image, to_srgb8
+from nubis.__main__ import main
 
 TONE_MAPS = ["agx", "aces", "none"]
 
@@ -187,6 +188,22 @@ def test_a_folder_that_is_not_there(picture, tmp_path, ending):
     with pytest.raises(FileError, match="none") as error:
         nubis.save(path, picture)
     assert isinstance(error.value, OSError)
+
+
+def test_heat():
+    """Black, red, yellow, white, and nothing beyond."""
+    counts = np.array([[0, 50, 100, 200, 300, 900]], dtype=np.uint32)
+    black, red, white = [0, 0, 0], [255, 0, 0], [255, 255, 255]
+    assert _image.heat(counts, 300).tolist() == [
+        [black, [128, 0, 0], red, [255, 255, 0], white, white]
+    ]
+
+
+def test_heat_beside_a_picture(tmp_path, capsys):
+    out = tmp_path / "sky.exr"
+    assert main(["render", "in_cloud", "--heat", "--size", "32x18", "--out", str(out)]) == 0
+    assert {path.name for path in tmp_path.iterdir()} == {"sky.exr", "sky.heat.png"}
+    assert "density evaluations a pixel" in capsys.readouterr().out
 
 
 def test_a_render_can_be_saved(renderer, tmp_path):

@@ -109,6 +109,17 @@ def test_sizes_that_four_does_not_divide(size):
     assert (few["radiance"] > 0).all(axis=-1).any()
 
 
+@pytest.mark.parametrize("size", [(160, 90), (97, 62), (162, 91)])
+def test_it_follows_from_the_picture_alone(size):
+    """Whatever the renderer has made before, and so what its buffers hold."""
+    camera, params = nubis.scenes["fair_weather"]
+    used = nubis.Renderer(*size, quality="balanced")
+    fresh = used.render(camera, params)
+    for before in "fair_weather", "cirrus":
+        used.render(*nubis.scenes[before])
+        assert used.render(camera, params).tobytes() == fresh.tobytes()
+
+
 def test_sheets_meet(monkeypatch):
     """A picture of more than a million pixels is made in sheets, which share a row of rays."""
     size = 4096, 264  # 256 rows a sheet

@@ -13,7 +13,7 @@ from time import perf_counter
 import numpy as np
 
 import nubis
-from nubis import _nubis
+from nubis import _image, _nubis
 
 _FORMATS = ("png", "exr", "hdr", "npy")
 
@@ -23,6 +23,7 @@ examples:
   python -m nubis render --all --size 320x180 --quality draft
   python -m nubis render storm --out storm.exr --time 60 --adapter cpu
   python -m nubis render fair_weather --params my_sky.toml --exposure 0.5
+  python -m nubis render in_cloud --heat
 """
 
 
@@ -82,6 +83,12 @@ def _parser() -> argparse.ArgumentParser:
     render.add_argument(
         "--params", type=Path, metavar="FILE", help="TOML file of a sky in place of the scenes' own"
     )
+    render.add_argument(
+        "--heat",
+        action="store_true",
+        help="save beside each picture, as NAME.heat.png, what each of its pixels costs: density "
+        "evaluations, black for 0, white for 1000 and more",
+    )
 
     cache = commands.add_parser(
         "cache",
@@ -126,6 +133,11 @@ def _render(args: argparse.Namespace) -> None:
             path.parent.mkdir(parents=True, exist_ok=True)
             nubis.save(path, frame, exposure=args.exposure)
             say(f"{path}: {renderer.adapter.name}, {width}x{height}, {milliseconds:.0f} ms")
+            if args.heat:
+                layers = renderer.render_layers(camera, sky or params, time=args.time)
+                beside = path.with_suffix(".heat.png")
+                _nubis.write_png(beside, _image.heat(layers["samples"]))
+                say(f"{beside}: {layers['samples'].mean():.1f} density evaluations a pixel")
             sys.stdout.flush()
 
 

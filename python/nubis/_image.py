@@ -35,6 +35,13 @@ def to_srgb8(
     return _nubis.to_srgb8(_pixels(frame), stops, tonemap)
 
 
+def heat(counts: npt.NDArray[np.uint32], white: int = 1000) -> npt.NDArray[np.uint8]:
+    """Return 8-bit pixels: black where a count is 0, then red, yellow, white from `white` on."""
+    ramp = 3 * counts[..., None] / white - np.arange(3)
+    pixels: npt.NDArray[np.uint8] = np.rint(255 * ramp.clip(0, 1)).astype(np.uint8)
+    return pixels
+
+
 def save(
     path: str | os.PathLike[str],
     frame: npt.ArrayLike,

@@ -16,6 +16,22 @@ pub(crate) enum Binding<'a> {
     View(&'a wgpu::TextureView),
 }
 
+impl Binding<'_> {
+    /// Bytes of the buffer, or of the texture with its mips: what they hold, without what drivers pad.
+    pub fn bytes(self) -> u64 {
+        let texture = match self {
+            Self::Buffer(buffer) => return buffer.size(),
+            Self::View(view) => view.texture(),
+        };
+        let texel = u64::from(texture.format().block_copy_size(None).unwrap_or(0));
+        let texels = |mip| {
+            let size = texture.size().mip_level_size(mip, texture.dimension());
+            u64::from(size.width) * u64::from(size.height) * u64::from(size.depth_or_array_layers)
+        };
+        texel * (0..texture.mip_level_count()).map(texels).sum::<u64>()
+    }
+}
+
 impl<'a> From<&'a wgpu::Buffer> for Binding<'a> {
     fn from(buffer: &'a wgpu::Buffer) -> Self {
         Self::Buffer(buffer)

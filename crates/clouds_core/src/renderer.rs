@@ -169,6 +169,26 @@ impl Renderer {
         })
     }
 
+    /// What the last picture has left on the GPU: for whom, the variable of the shaders, and bytes.
+    ///
+    /// The `scene` is what every picture reads, whatever its size; noises among it are shared by the renderers of a device.
+    /// A `still` and an `animation` have buffers of so many bytes a pixel.
+    pub fn memory(&self) -> Vec<(&'static str, &'static str, u64)> {
+        let mut held: Vec<_> = self.world.memory.iter().map(|&(name, bytes)| ("scene", name, bytes)).collect();
+        let mut add = |owner, bindings: Bindings<'_>| {
+            held.extend(bindings.into_iter().map(|(name, binding)| (owner, name, binding.bytes())));
+        };
+        if let Some(Still { refined, marched, composed, rays, .. }) = &self.still {
+            add("still", [marched.bindings(), refined.bindings(), composed.bindings()].concat());
+            add("still", rays.as_ref().map_or(Vec::new(), |rays| rays.bindings("rays")));
+        }
+        if let Some(Animation { refined, fresh, before, now, composed, .. }) = &self.animation {
+            add("animation", [fresh.bindings(), refined.bindings(), composed.bindings()].concat());
+            add("animation", [before.bindings(), now.bindings()].concat());
+        }
+        held
+    }
+
     /// The device.
     pub fn gpu(&self) -> &Arc<Gpu> {
         &self.gpu
@@ -450,7 +470,7 @@ impl Renderer {
         let offset = |p: &[f64; 3]| (DVec3::from_array(*p) - eye).as_vec3().extend(0.0).to_array();
         let points: Vec<_> = at.iter().map(offset).collect();
         let kernel = self.gpu.kernel("points", entry, Variant::new(params, &self.quality))?;
-        let answers = self.run_points(&kernel, &camera, &points, params, time, interrupt)?;
+        let answers = self.run_points(&kernel, &camera, &points, params, time, points::CHUNK, interrupt)?;
         Ok(answers.iter().map(|answer| answer[0]).collect())
     }
 
@@ -477,9 +497,11 @@ impl Renderer {
             Linked::from_source(&source).map_err(|error| Error::parameter("imports", error, "shader names"))?;
         let kernel = Kernel::from_linked(&self.gpu, &linked, "probe", Variant::new(params, &self.quality))?;
         let camera = Camera::equirect(DVec3::ZERO)?;
-        self.run_points(&kernel, &camera, inputs, params, time, interrupt)
+        // At once, so that what is timed fills the device.
+        self.run_points(&kernel, &camera, inputs, params, time, 1 << 20, interrupt)
     }
 
+    #[expect(clippy::too_many_arguments, reason = "what answers depend on, and how many are asked at once")]
     fn run_points(
         &mut self,
         kernel: &Kernel,
@@ -487,13 +509,14 @@ impl Renderer {
         points: &[[f32; 4]],
         params: &Params,
         time: f64,
+        most: usize,
         interrupt: Interrupt<'_>,
     ) -> Result<Vec<[f32; 4]>> {
         let frame = self.begin(camera, params, time)?;
         let Self { gpu, world, quality, timings, .. } = self;
         let scene = world.run(gpu, params, &frame, (camera.eye, time), quality, timings, interrupt)?;
         let mut ctx = Context { gpu, uniforms: scene.uniforms, variant: scene.variant, timings, interrupt };
-        points::run(&mut ctx, &scene, &frame, kernel, points)
+        points::run(&mut ctx, &scene, &frame, kernel, points, most)
     }
 
     /// Checks the arguments of a call and works out its frame.
@@ -519,6 +542,8 @@ struct World {
     volume: Volume,
     majorants: Majorants,
     sun_volume: SunVolume,
+    /// Names and bytes of all of it, as it was bound last.
+    memory: Vec<(&'static str, u64)>,
 }
 
 impl World {
@@ -537,6 +562,7 @@ impl World {
             volume: Volume::new(),
             majorants: Majorants::new(),
             sun_volume: SunVolume::new(),
+            memory: Vec::new(),
         }
     }
 
@@ -572,6 +598,7 @@ impl World {
         bindings.extend(majorants);
         let sun_volume = self.sun_volume.run(&mut ctx, params, frame, at, &bindings)?; // as clouds and eye move
         bindings.extend(sun_volume);
+        self.memory = bindings.iter().map(|(name, binding)| (*name, binding.bytes())).collect();
         Ok(Scene { uniforms: &self.uniforms, variant, bindings })
     }
 }

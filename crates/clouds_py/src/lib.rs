@@ -504,6 +504,10 @@ impl Renderer {
         py.detach(|| lock(&self.core).timings.0.clone())
     }
 
+    fn memory(&self, py: Python<'_>) -> Vec<(&'static str, &'static str, u64)> {
+        py.detach(|| lock(&self.core).memory())
+    }
+
     fn adapter<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let info = py.detach(|| lock(&self.core).gpu().info.clone());
         adapter_to_python(py, &info)

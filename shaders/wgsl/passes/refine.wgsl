@@ -19,7 +19,7 @@ fn refine(@builtin(global_invocation_id) id: vec3u) {
     if !any(has) {
         return;
     }
-    // Of the squares above and to the left; on the rim the square itself again.
+    // Of the squares above and to the left, narrower behind the last column and row; on the rim the square itself again.
     let before = (max(low, vec2u(1u)) - 1u) / frame.lattice * frame.lattice;
 
     let a = read(low);

@@ -1,7 +1,7 @@
 //! The clouds before the sky: what the caller gets.
 
-use super::Scene;
 use super::march::Marched;
+use super::{Bindings, Scene};
 use crate::error::Result;
 use crate::frame::Frame;
 use crate::gpu::{Gpu, Work};
@@ -25,6 +25,10 @@ impl Composed {
             depth: gpu.buffer("depth", 4 * pixels),
         }
     }
+
+    pub fn bindings(&self) -> Bindings<'_> {
+        vec![("image", (&self.image).into()), ("sky", (&self.sky).into()), ("depth", (&self.depth).into())]
+    }
 }
 
 /// Composes the band of `frame`; `layers` fills `sky` and `depth` too, which takes lavapipe a seventh of the time.
@@ -37,8 +41,7 @@ pub(crate) fn run(
     out: &Composed,
     layers: bool,
 ) -> Result<()> {
-    let ours = [("image", (&out.image).into()), ("sky", (&out.sky).into()), ("depth", (&out.depth).into())];
-    let bindings = [scene.bindings.as_slice(), &marched.bindings(), &ours].concat();
+    let bindings = [scene.bindings.as_slice(), &marched.bindings(), &out.bindings()].concat();
     let kernel = gpu.kernel("composite", "composite", variant(scene.variant, frame, layers))?;
     work.dispatch(&kernel, &bindings, [frame.width, frame.rows, 1])
 }

@@ -6,18 +6,19 @@ use crate::frame::Frame;
 use crate::kernel::Kernel;
 
 /// Points in one dispatch: few enough that a march of each toward the sun stays far under a watchdog's second.
-const CHUNK: usize = 1 << 14;
+pub(crate) const CHUNK: usize = 1 << 14;
 
-/// Runs `kernel` over points (four numbers each), whatever it makes of them.
+/// Runs `kernel` over points (four numbers each), whatever it makes of them, `most` of them in a dispatch.
 pub(crate) fn run(
     ctx: &mut Context<'_>,
     scene: &Scene<'_>,
     frame: &Frame,
     kernel: &Kernel,
     points: &[[f32; 4]],
+    most: usize,
 ) -> Result<Vec<[f32; 4]>> {
     let mut results = Vec::with_capacity(points.len());
-    for chunk in points.chunks(CHUNK) {
+    for chunk in points.chunks(most) {
         let bytes = std::mem::size_of_val(chunk) as u64;
         let (given, answers) = (ctx.gpu.buffer("points", bytes), ctx.gpu.buffer("results", bytes));
         ctx.gpu.queue.write_buffer(&given, 0, bytemuck::cast_slice(chunk));

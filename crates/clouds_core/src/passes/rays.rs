@@ -31,6 +31,16 @@ impl Rays {
         }
     }
 
+    /// `state` is the variable that the rays are kept in.
+    pub fn bindings(&self, state: &'static str) -> Bindings<'_> {
+        vec![
+            (state, (&self.state).into()),
+            ("active_rays", (&self.active).into()),
+            ("progress", (&self.progress).into()),
+            ("uncertainty", (&self.uncertainty).into()),
+        ]
+    }
+
     /// Runs `kernel` until the ray of each pixel of the band is done. `state` is the variable that they are kept in.
     pub fn run(
         &self,
@@ -44,13 +54,7 @@ impl Rays {
         let mut clear = ctx.gpu.work();
         clear.clear(&self.state);
         clear.submit(ctx.timings, ctx.interrupt)?;
-        let ours = [
-            (state, (&self.state).into()),
-            ("active_rays", (&self.active).into()),
-            ("progress", (&self.progress).into()),
-            ("uncertainty", (&self.uncertainty).into()),
-        ];
-        let bindings = [scene.bindings.as_slice(), outputs, &ours].concat();
+        let bindings = [scene.bindings.as_slice(), outputs, &self.bindings(state)].concat();
         let mut active: Vec<u32> = (0..frame.width * frame.rows).collect();
         let mut budget = 32;
         while !active.is_empty() {

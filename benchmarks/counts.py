@@ -1,0 +1,93 @@
+"""How often a picture reads the textures of its clouds, pixel by pixel: counted, not estimated.
+
+The march counts its density evaluations (the layer `samples`) and nothing else. Reads are counted
+by a copy of the shaders in which every read counts itself: it lies in a folder of its own, and a
+process of its own reads it (`NUBIS_SHADERS`), so that no shader that makes pictures is slower.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import re
+import shutil
+import tempfile
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+import nubis
+from benchmarks.reference import ROOT, Size
+
+#: What a march reads for its clouds, by the names of shaders/wgsl/bindings.wgsl.
+TEXTURES = "weather_map", "shape_noise", "curl_noise", "detail_noise", "sun_volume"
+
+Counts = npt.NDArray[np.uint32]
+
+# `quality.path_samples` means nothing to a march: in the copy it says what is counted, evaluations
+# up to here, then the reads of each texture, then those of all.
+_EVALUATIONS = 1000
+_ALL = _EVALUATIONS + len(TEXTURES)
+
+
+class Job(NamedTuple):
+    """A picture, and what is counted in it: "evaluations", "reads", or the name of a texture."""
+
+    camera: nubis.Camera
+    params: nubis.Params
+    quality: nubis.Quality
+    what: str
+
+
+def count(jobs: Sequence[Job], size: Size) -> list[Counts]:
+    """The counts of each pixel for each picture."""
+    for job in jobs:
+        if job.params.volume is not None or job.params.light.model == "path":
+            raise ValueError("only the march through procedural clouds is counted")
+    with tempfile.TemporaryDirectory() as folder:
+        counting_shaders(Path(folder))
+        context = multiprocessing.get_context("spawn")
+        with context.Pool(1, _use, (folder,)) as pool:
+            return pool.starmap(_count, [(job, size) for job in jobs])
+
+
+def counting_shaders(folder: Path) -> None:
+    """Copy the shaders into a folder, and make each read of the clouds' textures count itself."""
+    source = Path(os.environ.get("NUBIS_SHADERS") or ROOT / "shaders" / "wgsl")
+    shutil.copytree(source, folder, dirs_exist_ok=True)
+    found = []
+    for name in "density", "sun_volume":
+        path = folder / f"{name}.wgsl"
+        lines = []
+        for line in path.read_text().splitlines():
+            indent = line[: len(line) - len(line.lstrip())]
+            if line.strip() == "evaluations += 1u;":
+                line = f"{indent}evaluations += u32(quality.path_samples <= {_EVALUATIONS}u);"
+            for texture in re.findall(r"textureSampleLevel\((\w+)", line):
+                found.append(texture)
+                chosen = _EVALUATIONS + found.index(texture) + 1
+                counts = f"quality.path_samples == {chosen}u || quality.path_samples == {_ALL + 1}u"
+                lines.append(f"{indent}evaluations += u32({counts});")
+            lines.append(line)
+        path.write_text("\n".join(lines) + "\n")
+    if tuple(found) != TEXTURES:
+        raise ValueError(f"the clouds read {found}, where {TEXTURES} are counted")
+
+
+def _use(folder: str) -> None:
+    os.environ["NUBIS_SHADERS"] = folder
+    warnings.filterwarnings("ignore", "no hardware Vulkan adapter")
+
+
+def _count(job: Job, size: Size) -> Counts:
+    chosen: dict[str, int] = {"evaluations": _EVALUATIONS, "reads": _ALL + 1}
+    chosen |= {name: _EVALUATIONS + i for i, name in enumerate(TEXTURES, start=1)}
+    quality = job.quality.replace(path_samples=chosen[job.what])
+    layers: dict[str, Any] = nubis.Renderer(*size, quality=quality).render_layers(
+        job.camera, job.params
+    )
+    return layers["samples"]

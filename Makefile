@@ -84,6 +84,7 @@ $(VENV)/bench: pyproject.toml $(VENV)/ready
 
 bench: build $(VENV)/bench ## Measure error against time into benchmarks/results, docs/accuracy.md (25 min on two cores)
 	$(BIN)/python -m benchmarks
+	$(BIN)/python -m benchmarks.speed
 
 bench-kernels: setup ## Time a small frame and each of its kernels (NUBIS_ADAPTER chooses the adapter)
 	cargo bench --bench frame

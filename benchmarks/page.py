@@ -51,9 +51,98 @@ def write_speed(folder: Path, page: Path = SPEED) -> None:
     if (found := _read(folder, "profile.json")) is not None:
         blocks["profile"] = _about(found["header"]) + _load(found) + "\n\n" + profile(found)
         blocks["memory"] = memory(found)
+    if (found := _read(folder, "speed.json")) is not None:
+        blocks["against the published"] = _about(found["header"]) + "\n\n" + _against(found)
+        blocks["content"] = _content(found["content"])
+        blocks["growth"] = _growth(found["growth"])
+        blocks["animation"] = _animation(found)
     if (heat := _read(folder, "heat.json")) is not None:
         blocks["heat"] = _heat(heat) + "\n\n" + _image(folder, page, "heat")
     page.write_text(_filled(page.read_text(), blocks))
+
+
+def _against(found: Row) -> str:
+    """How many times faster, scene by scene, and in the geometric mean."""
+    ratios = found["ratios"]
+    names = list(dict.fromkeys(row["published"] for row in ratios))
+    times = {(row["scene"], row["method"]): row for row in found["presets"]}
+    lines = []
+    for scene in dict.fromkeys(row["scene"] for row in ratios):
+        line = [f"`{scene}`"]
+        for row in (row for row in ratios if row["scene"] == scene):
+            theirs = times[scene, row["published"]]
+            cell = f"{_percent(row['error'])}, {theirs['processor_seconds']:.2g} s"
+            if row["ours"] is None:
+                line.append(f"{cell}: none of ours errs as little")
+            else:
+                line.append(
+                    f"{cell}: **{row['ratio']:.1f}×**, {row['ours']} ({_percent(row['our_error'])})"
+                )
+        lines.append(line)
+    means = ["geometric mean"]
+    for name in names:
+        known = [row["ratio"] for row in ratios if row["published"] == name and row["ratio"]]
+        means.append(f"**{np.exp(np.mean(np.log(known))):.1f}×** over {len(known)} scenes")
+    heads = list(dict.fromkeys(m for _, m in times if m not in names))
+    ours = []
+    for scene in dict.fromkeys(s for s, _ in times):
+        rows = [times[scene, name] for name in heads]
+        cells = [f"{_percent(r['rel_rmse'])}, {r['processor_seconds']:.2g} s" for r in rows]
+        ours.append([f"`{scene}`", *cells])
+    return (
+        _table(["scene", *(f"`{name}`" for name in names)], [*lines, means])
+        + "\n\nOurs, error and processor time:\n\n"
+        + _table(["scene", *heads], ours)
+    )
+
+
+def _content(rows: list[Row]) -> str:
+    lines = [
+        [
+            row["what"],
+            f"`{row['scene']}`",
+            f"`{row['quality']}`",
+            " of ".join(_percent(share) for share in row["cover"]),
+            " of ".join(f"{1e3 * t:.0f}" for t in row["processor_seconds"]),
+            f"**{_percent(row['share'])}**",
+        ]
+        for row in rows
+    ]
+    heads = ["", "scene", "quality", "pixels with cloud", "processor ms", "share"]
+    return _table(heads, lines)
+
+
+def _growth(rows: list[Row]) -> str:
+    lines = [
+        [
+            "{}×{}".format(*row["size"]),
+            f"`{row['quality']}`",
+            f"{row['processor_seconds']:.2f}",
+            f"{1e9 * row['processor_seconds'] / (row['size'][0] * row['size'][1]):.0f}",
+        ]
+        for row in rows
+    ]
+    return _table(["pixels", "quality", "processor seconds", "ns a pixel"], lines)
+
+
+def _animation(found: Row) -> str:
+    cores = found["header"]["cores"]
+    lines = []
+    for row in [*found["animation"], *found["anchors"]]:
+        still = f"{row['still']['seconds']:.2f}" if "still" in row else "–"
+        lines.append(
+            [
+                f"`{row['scene']}`",
+                "{}×{}".format(*row["size"]),
+                f"`{row['quality']}`",
+                still,
+                f"{1e3 * row['seconds']:.0f}",
+                f"{1e3 * row['processor_seconds'] / cores:.0f}",
+                ", ".join(_percent(e) for e in row["rel_rmse"]),
+            ]
+        )
+    heads = ["scene", "pixels", "quality", "still, s", "frame, ms", "processor ms / cores", "error"]
+    return _table(heads, lines)
 
 
 def _filled(text: str, blocks: dict[str, str]) -> str:

@@ -2,6 +2,8 @@
 something does.
 """
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -220,3 +222,19 @@ def test_bad_shots(renderer, named, shot):
 def test_a_bad_background_is_refused_at_once(renderer):
     with pytest.raises(ParameterError, match="background"):
         renderer(16, 9).animate([], background="black")
+
+
+def test_the_sky_is_baked_every_so_often():
+    """In steps of one percent of the height, which change the sky by less than half of that."""
+    params = nubis.Params().with_(**{"clouds.coverage": 0.0, "high_clouds.coverage": 0.0})
+    make = nubis.Renderer(32, 18)
+    pictures, baked = [], 0
+    for height in np.arange(1000.0, 1040.0, 2.0):
+        camera = nubis.Camera.look_at((0, 0, height), (0, 1000, height + 200), (0, 0, 1), 60.0)
+        pictures.append(make.render(camera, params))
+        baked += "sky_map_bake" in make.timings
+    assert 3 <= baked <= 6
+    for before, after in pairwise(pictures):
+        np.testing.assert_allclose(after[:11], before[:11], rtol=5e-3)  # above the horizon
+    fresh = nubis.Renderer(32, 18).render(camera, params)
+    assert fresh.tobytes() == pictures[-1].tobytes()

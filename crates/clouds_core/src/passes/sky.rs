@@ -16,8 +16,8 @@ const SIZE: [u32; 3] = [128, 160, 1];
 type Key = (params::Sun, params::Atmosphere, [f64; 3], [f32; 3]);
 
 /// Where the sky is seen from, near the eye: the same place for all eyes around it, so that one that flies has a new sky
-/// every few metres of height or hundreds of metres of way, not in every frame. What that costs: half a percent of the
-/// height, by which the air dims by less than that, and a hundredth of a degree of the sun's elevation.
+/// every few metres of height or hundreds of metres of way, not in every frame. What that costs: half a percent of
+/// the height, which changes the sky by less than that, and a hundredth of a degree of the sun's elevation.
 fn viewpoint(eye: DVec3, params: &Params) -> DVec3 {
     let radius = f64::from(params.atmosphere.planet_radius);
     let centre = DVec3::new(0.0, 0.0, -radius);

@@ -131,6 +131,17 @@ def test_sheets_meet(monkeypatch):
     assert np.isfinite(few["radiance"]).all()
 
 
+def test_nothing_is_left_of_the_picture_before():
+    camera, (other, params) = nubis.scenes["above"][0], nubis.scenes["overcast"]
+    used = nubis.Renderer(512, 288, quality="draft")
+    used.render(camera, params)
+    layers = used.render_layers(other, params)
+    fresh = nubis.Renderer(512, 288, quality="draft").render_layers(other, params)
+    assert (fresh["samples"] == 0).mean() > 0.3
+    for name, expected in fresh.items():
+        assert np.array_equal(layers[name], expected), name
+
+
 def test_a_clear_sky_takes_no_samples():
     clear = layers((64, 36), 0.1, **{"clouds.coverage": 0.0, "high_clouds.coverage": 0.0})
     assert (clear["samples"] == 0).all()

@@ -31,8 +31,12 @@ PUBLISHED = "nubis2015", "thesis2018", "vsu2022"
 #: What stands against them: the fastest that errs no more than they do.
 OURS = {
     "draft": nubis.quality("draft"),
+    "draft, 7 light samples": nubis.quality("draft").replace(light_steps=7),
     "balanced": nubis.quality("balanced"),
     "balanced, sun volume": nubis.quality("balanced").replace(sun_volume=True, light_steps=3),
+    "balanced, finer": nubis.quality("balanced").replace(
+        steps_zenith=128, steps_horizon=320, light_steps=12, contrast=0.1
+    ),
 }
 #: What all are compared with: at this size `reference` would take hours. It errs by 1 % itself, in
 #: `storm` by 7 %, in `sunset` by 28 % (docs/accuracy.md).
@@ -220,7 +224,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=RESULTS / "speed.json")
     args = parser.parse_args()
     width, height = (int(n) for n in args.size.split("x"))
-    command = ["benchmarks.speed", "--size", args.size]
+    command = ["benchmarks.speed", "--size", args.size, "--repeats", str(args.repeats)]
     header = measure.header(command) | {"size": (width, height), "repeats": args.repeats}
     found = run((width, height), args.repeats, quick=args.quick)
     args.out.write_text(json.dumps({"header": header} | found, indent=1) + "\n")

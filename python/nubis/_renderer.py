@@ -215,8 +215,9 @@ class Renderer:
 
         One pixel in sixteen is marched per frame, the others follow the clouds from the frame
         before; the first frame and the first after a cut are stills. A static shot converges to
-        the still in which every pixel is marched (``contrast=0``). With light model ``"path"`` or quality ``"reference"`` every frame is a still,
-        and a static shot goes on tracing paths: each frame has less noise.
+        the still in which every pixel is marched (``contrast=0``). With light model ``"path"`` or
+        quality ``"reference"`` every frame is a still, and a static shot goes on tracing paths:
+        each frame has less noise.
 
         Parameters
         ----------

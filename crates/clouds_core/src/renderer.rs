@@ -240,12 +240,13 @@ impl Renderer {
         })?;
 
         let [width, height] = self.size;
+        let lattice = refine::coarsest(&frame, quality) > 1;
         let mut picture = Picture::default();
         for sheet in sheets([width, height], method) {
             frame.sheet_row = sheet.start;
             frame.rows = sheet.len() as u32;
             // Lattices of rays meet in the first row of the next sheet.
-            let shared = u32::from(method == Method::March && quality.contrast > 0.0 && sheet.end < height);
+            let shared = u32::from(method == Method::March && lattice && sheet.end < height);
             frame.sheet_rows = frame.rows + shared;
             let pixels = u64::from(width) * u64::from(frame.sheet_rows);
             if self.still.as_ref().is_none_or(|still| still.pixels < pixels || still.method != method) {

@@ -51,12 +51,21 @@ class Clouds(Block):
         Cloud type: 0 stratus, 0.5 stratocumulus, 1 cumulus. Shifts the weather map's type, 0.5 the
         map as it is. Allowed: a number from 0 to 1.
     precipitation : float
-        Rain: thickens and darkens the clouds (nubis2015). Scales the weather map's precipitation, 0
-        is dry. Allowed: a number from 0 to 1.
+        Rain: thickens and darkens the clouds and lets them grow to cumulonimbus (nubis2015). Scales
+        the weather map's precipitation, 0 is dry. Allowed: a number from 0 to 1.
     base : float
         Altitude of the cloud base. Allowed: a number from 0 to 20000 m.
     top : float
-        Altitude of the highest cloud tops. Allowed: a number from 1 to 25000 m.
+        Altitude of the highest cloud tops where there is no rain. Allowed: a number from 1 to 25000
+        m.
+    cumulonimbus_top : float
+        Altitude of the tops of cumulonimbus, where precipitation is 1 (nubis2015: 8 km). Allowed: a
+        number from 1 to 25000 m.
+    anvil : float
+        How far the tops of cumulonimbus spread. Allowed: a number from 0 to 1.
+    rain_extinction : float
+        Extinction of the rain that is seen below the clouds where it is heaviest; 0 hides it.
+        Allowed: a number from 0 to 1 1/m.
     extinction : float
         Extinction where the density is 1. Allowed: a number from 0 to 100000000 1/m.
     seed : int
@@ -74,6 +83,19 @@ class Clouds(Block):
         50000 m.
     curl : float
         How far curl noise displaces the detail at the base. Allowed: a number from 0 to 2000 m.
+    stratus : tuple[float, float, float, float]
+        Where the density of stratus rises from 0 to 1 and where it falls back, as fractions of its
+        height (nubis2015, figure 4.10; vsu2022's gradients). Allowed: 4 numbers from 0 to 1.
+    stratocumulus : tuple[float, float, float, float]
+        The same for stratocumulus. Allowed: 4 numbers from 0 to 1.
+    cumulus : tuple[float, float, float, float]
+        The same for cumulus. Allowed: 4 numbers from 0 to 1.
+    cumulonimbus : tuple[float, float, float, float]
+        The same for cumulonimbus. Allowed: 4 numbers from 0 to 1.
+    profile : array of float32, shape (H, W), or None
+        Density by height and type in place of the first three: row 0 at the tops, column 0 type 0
+        (Frostbite 2016). Allowed: None or a float array of shape (H, W), H and W from 1 to 8192,
+        values from 0 to 1.
     """
 
     coverage: float = 0.45
@@ -81,6 +103,9 @@ class Clouds(Block):
     precipitation: float = 0.0
     base: float = 1200.0
     top: float = 3200.0
+    cumulonimbus_top: float = 8000.0
+    anvil: float = 0.5
+    rain_extinction: float = 0.0
     extinction: float = 0.15
     seed: int = 1
     noise: Literal["nubis2015", "vsu2022"] = "nubis2015"
@@ -89,6 +114,52 @@ class Clouds(Block):
     detail: float = 0.4
     curl_scale: float = 1600.0
     curl: float = 70.0
+    stratus: tuple[float, float, float, float] = (0.02, 0.05, 0.09, 0.11)
+    stratocumulus: tuple[float, float, float, float] = (0.02, 0.12, 0.35, 0.6)
+    cumulus: tuple[float, float, float, float] = (0.01, 0.07, 0.25, 1.0)
+    cumulonimbus: tuple[float, float, float, float] = (0.005, 0.04, 0.8, 1.0)
+    profile: npt.NDArray[np.float32] | None = None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class UpperClouds(Block):
+    """A second deck of volumetric clouds, above the first. Its weather is another part of the same
+    map, and its noises are those of the first at another scale.
+
+    Attributes
+    ----------
+    coverage : float
+        How much of the sky it covers: as `clouds.coverage`; 0 is none. Allowed: a number from 0 to
+        1.
+    type : float
+        Cloud type: as `clouds.type`. Allowed: a number from 0 to 1.
+    base : float
+        Altitude of its base. Allowed: a number from 0 to 25000 m.
+    top : float
+        Altitude of its tops. Allowed: a number from 1 to 25000 m.
+    extinction : float
+        Extinction where the density is 1. Allowed: a number from 0 to 100000000 1/m.
+    scale : float
+        Size of its clouds, as a share of the size of those below. Allowed: a number from 0.01 to
+        100.
+    direction : float
+        Compass direction toward which its wind blows, clockwise from north. Allowed: a number from
+        -360 to 360 degrees.
+    speed : float
+        Speed of that wind. Allowed: a number from -1000 to 1000 m/s.
+    shear : float
+        How far its tops lean downwind. Allowed: a number from -20000 to 20000 m.
+    """
+
+    coverage: float = 0.0
+    type: float = 0.5
+    base: float = 4800.0
+    top: float = 5600.0
+    extinction: float = 0.06
+    scale: float = 0.4
+    direction: float = 95.0
+    speed: float = 16.0
+    shear: float = 150.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -110,6 +181,16 @@ class Weather(Block):
         Typical distance between clouds. Allowed: a number from 100 to 1000000 m.
     variety : float
         How much the cover varies over distances of several clouds. Allowed: a number from 0 to 1.
+    broad_variety : float
+        How much a second, larger map shifts the weather, by seed or `broad_map`, so that no part of
+        the sky looks like another; 0 leaves the first map as it is. The baked one leaves a `map` of
+        yours alone. Allowed: a number from 0 to 1.
+    broad_extent : float
+        Width of the square that the larger map covers; beyond it, that repeats. Allowed: a number
+        from 100 to 10000000 m.
+    broad_map : array of float32, shape (H, W, 3), or None
+        A larger map of your own: shifts of coverage, type and precipitation, 0.5 is none. Allowed:
+        None or a float array of shape (H, W, 3), H and W from 1 to 8192, values from 0 to 1.
     """
 
     extent: float = 60000.0
@@ -117,6 +198,9 @@ class Weather(Block):
     seed: int = 7
     scale: float = 5000.0
     variety: float = 0.5
+    broad_variety: float = 0.3
+    broad_extent: float = 430000.0
+    broad_map: npt.NDArray[np.float32] | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -396,6 +480,9 @@ class Params(Root):
         The sun.
     clouds : Clouds
         The volumetric clouds: where they are and what they are made of.
+    upper_clouds : UpperClouds
+        A second deck of volumetric clouds, above the first. Its weather is another part of the same
+        map, and its noises are those of the first at another scale.
     weather : Weather
         The weather map: where the clouds stand.
     wind : Wind
@@ -413,6 +500,7 @@ class Params(Root):
 
     sun: Sun = field(default_factory=Sun)
     clouds: Clouds = field(default_factory=Clouds)
+    upper_clouds: UpperClouds = field(default_factory=UpperClouds)
     weather: Weather = field(default_factory=Weather)
     wind: Wind = field(default_factory=Wind)
     high_clouds: HighClouds = field(default_factory=HighClouds)

@@ -9,6 +9,11 @@ override CAMERA: u32 = 0u; // the projection, see camera.wgsl
 override PRECISE: bool = false; // that grid is read by loads and in f32, not filtered by the hardware in half floats
 override SUNLIT: bool = true; // the sun can reach the clouds
 override SUN_VOLUME: bool = false; // light from beyond the light samples is read from the sun volume
+override RAINY: bool = true; // it may rain: cumulonimbus grow
+override RAIN_SHAFTS: bool = true; // rain is seen below the clouds
+override UPPER: bool = true; // there is a second deck
+override BROAD_WEATHER: bool = true; // a larger map shifts the weather
+override PROFILE_TABLE: bool = false; // the profile by height is the user's table
 override LIGHT_DETAIL: bool = true; // there are light samples that see the detail
 override LIGHT_CHEAP: bool = true; // there are light samples that do not
 
@@ -23,6 +28,8 @@ override LIGHT_CHEAP: bool = true; // there are light samples that do not
 @group(0) @binding(5) var detail_noise: texture_3d<f32>; // three Worley FBMs (passes/noise)
 @group(0) @binding(6) var curl_noise: texture_2d<f32>; // a divergence-free vector in xy (passes/noise)
 @group(0) @binding(7) var weather_map: texture_2d<f32>; // coverage, type, precipitation (passes/weather)
+@group(0) @binding(42) var broad_map: texture_2d<f32>; // shifts of those; g and a also bend the smaller map (passes/broad_weather)
+@group(0) @binding(43) var profile_table: texture_2d<f32>; // density by type and height (passes/profile)
 @group(0) @binding(8) var high_map: texture_2d<f32>; // density of the high clouds (passes/high_clouds)
 @group(0) @binding(9) var sky_map: texture_2d<f32>; // the sky by direction, see SKY_MAP_SCALE (passes/sky)
 @group(0) @binding(10) var<storage, read_write> sky_light: array<vec4f, 4>; // what the sky gives to clouds (passes/sky)

@@ -7,25 +7,26 @@
 // How many times the field was read by this invocation.
 var<private> evaluations: u32 = 0u;
 
-// Where the profile rises from 0 to 1 and falls back, as fractions of the shell's height (nubis2015, figure 4.10).
-const STRATUS = vec4f(0.02, 0.05, 0.09, 0.11);
-const STRATOCUMULUS = vec4f(0.02, 0.12, 0.35, 0.60);
-const CUMULUS = vec4f(0.01, 0.07, 0.25, 1.0);
-
 struct LocalWeather {
     coverage: f32,
     kind: f32, // 0 stratus, 0.5 stratocumulus, 1 cumulus
-    precipitation: f32,
+    precipitation: f32, // turns cumulus into cumulonimbus
 }
 
-// What the weather alone says of a point: enough to know that there is no cloud.
+// What a point can lie in.
+const CLOUD = 0u;
+const UPPER_CLOUD = 1u; // of the deck above
+const RAIN = 2u; // below the base
+
+// What the weather alone says of a point: enough to know that there is nothing.
 struct Column {
-    limit: f32, // the base shape cannot exceed it; 0 where there is no cloud
+    limit: f32, // the base shape cannot exceed it; 0 where there is nothing
     profile: f32,
     coverage: f32,
-    height: f32, // 0 at the base of the clouds, 1 at their top
+    height: f32, // 0 at the base of the cloud, 1 at its top
     precipitation: f32,
     at: vec3f, // where the noises are read: without the wind's lean, the altitude as z, m; in a grid the point itself
+    medium: u32,
 }
 
 // How the three parameters of a cloud meet the weather map (vsu2022: coverage shifts the map).
@@ -35,21 +36,42 @@ fn weather_from_map(texel: vec3f) -> LocalWeather {
     let kind = saturate(texel.g + 2.0 * params.clouds.type_ - 1.0);
     // Where it rains, coverage is at least 0.7 and the type is pushed toward cumulonimbus (nubis2015), but a clear
     // sky stays clear.
-    let wet = 0.7 * rain * saturate(5.0 * params.clouds.coverage);
+    let wet = 0.95 * rain * saturate(5.0 * params.clouds.coverage);
     return LocalWeather(max(shifted, wet), mix(kind, 1.0, rain), rain);
 }
 
-// Where the profile of a type rises and falls: the weighted sum of three.
-fn profile_edges(kind: f32) -> vec4f {
+// Where the profile of a type rises from 0 to 1 and falls back, as fractions of the height: the weighted sum of three
+// (nubis2015, figure 4.10; vsu2022's gradients, equations 8 to 11), and where it rains that of cumulonimbus.
+fn profile_edges(kind: f32, rain: f32) -> vec4f {
     let stratus = saturate(1.0 - 2.0 * kind);
     let cumulus = saturate(2.0 * kind - 1.0);
-    return stratus * STRATUS + (1.0 - stratus - cumulus) * STRATOCUMULUS + cumulus * CUMULUS;
+    let dry = stratus * params.clouds.stratus + (1.0 - stratus - cumulus) * params.clouds.stratocumulus
+        + cumulus * params.clouds.cumulus;
+    if RAINY {
+        return mix(dry, params.clouds.cumulonimbus, rain);
+    }
+    return dry;
 }
 
-// Density by height for a type.
-fn height_profile(height: f32, kind: f32) -> f32 {
-    let g = profile_edges(kind);
-    return remap01(height, g.x, g.y) * (1.0 - smoothstep(g.z, g.w, height));
+fn profile_between(height: f32, edges: vec4f) -> f32 {
+    return remap01(height, edges.x, edges.y) * (1.0 - smoothstep(edges.z, max(edges.w, edges.z + 1e-4), height));
+}
+
+// Density by height for a type: from its edges, or from the user's table.
+fn height_profile(height: f32, kind: f32, rain: f32) -> f32 {
+    if PROFILE_TABLE {
+        let dry = profile_from_table(height, kind);
+        return select(dry, mix(dry, profile_between(height, params.clouds.cumulonimbus), rain), RAINY);
+    }
+    return profile_between(height, profile_edges(kind, rain));
+}
+
+// The first row of the table is the top of the clouds and the last their base, as in a picture; its first column is type
+// 0 and its last type 1.
+fn profile_from_table(height: f32, kind: f32) -> f32 {
+    let size = vec2f(textureDimensions(profile_table));
+    let uv = (vec2f(kind, 1.0 - height) * (size - 1.0) + 0.5) / size;
+    return textureSampleLevel(profile_table, clamp_sampler, uv, 0.0).r;
 }
 
 // nubis2015: the low-frequency FBM lowers the old minimum, which raises the shape.
@@ -74,17 +96,121 @@ fn cloud_column(p: vec3f, altitude: f32) -> Column {
     evaluations += 1u;
     if VOLUME {
         let height = saturate((p.z - frame.volume_low.z) / (frame.volume_high.z - frame.volume_low.z));
-        return Column(select(0.0, 1.0, in_volume(p)), 1.0, 1.0, height, 0.0, p);
+        return Column(select(0.0, 1.0, in_volume(p)), 1.0, 1.0, height, 0.0, p, CLOUD);
     }
-    let height = (altitude - params.clouds.base) / (params.clouds.top - params.clouds.base);
-    let at = p.xy - height * params.wind.shear * frame.wind_direction;
-    let uv = frame.weather_origin + vec2f(at.x, -at.y) / params.weather.extent;
-    let weather = weather_from_map(textureSampleLevel(weather_map, repeat_sampler, uv, 0.0).rgb);
-    let profile = height_profile(height, weather.kind);
+    let at = leant(p.xy, altitude);
+    let broad = broad_weather(p.xy);
+    let weather = weather_from_map(weather_texel(frame.weather_origin, at, broad));
+    var column = cloud_in(weather, at, altitude);
+    if RAIN_SHAFTS && altitude < params.clouds.base {
+        column = rain_below(weather, at, altitude);
+    }
+    if UPPER {
+        let upper = upper_cloud_at(p, altitude, broad);
+        if upper.limit > column.limit {
+            return upper;
+        }
+    }
+    return column;
+}
+
+// A place beside the eye, without the wind's lean.
+fn leant(place: vec2f, altitude: f32) -> vec2f {
+    let lean = (altitude - params.clouds.base) / (params.clouds.top - params.clouds.base) * params.wind.shear;
+    return place - lean * frame.wind_direction;
+}
+
+// What a larger map shifts the weather by, and, by its green and alpha, bends the smaller map, so that it does not look
+// like its own repetition.
+fn broad_weather(place: vec2f) -> vec4f {
+    if BROAD_WEATHER {
+        let uv = frame.broad_origin + vec2f(place.x, -place.y) / params.weather.broad_extent;
+        return textureSampleLevel(broad_map, repeat_sampler, uv, 0.0);
+    }
+    return vec4f(0.0);
+}
+
+fn weather_uv(origin: vec2f, at: vec2f, broad: vec4f) -> vec2f {
+    let uv = origin + vec2f(at.x, -at.y) / params.weather.extent;
+    return select(uv, uv + frame.broad_bend * broad.ag, BROAD_WEATHER);
+}
+
+// The weather map at a place `at` from where the eye is in its tile.
+fn weather_texel(origin: vec2f, at: vec2f, broad: vec4f) -> vec3f {
+    let texel = textureSampleLevel(weather_map, repeat_sampler, weather_uv(origin, at, broad), 0.0).rgb;
+    return select(texel, saturate(texel + params.weather.broad_variety * broad.rgb), BROAD_WEATHER);
+}
+
+// How much of a cumulonimbus stands where it rains so much: its tower in the core of the rain, its anvil farther around.
+fn tower(rain: f32) -> f32 {
+    return smoothstep(0.5, 0.9, rain);
+}
+
+// Altitude of the tops: where it rains they grow to those of cumulonimbus (nubis2015).
+fn cloud_top(rain: f32) -> f32 {
+    if RAINY {
+        return mix(params.clouds.top, tallest(), tower(rain));
+    }
+    return params.clouds.top;
+}
+
+fn tallest() -> f32 {
+    return max(params.clouds.top, params.clouds.cumulonimbus_top);
+}
+
+// Between which heights of the whole cloud its anvil rises to full strength and falls back.
+const ANVIL = vec4f(0.64, 0.80, 0.88, 1.0);
+
+fn anvil(rain: f32, altitude: f32) -> f32 {
+    let height = (altitude - params.clouds.base) / (tallest() - params.clouds.base);
+    let edge = 0.6 - 0.5 * params.clouds.anvil;
+    return smoothstep(edge, edge + 0.3, rain) * profile_between(height, ANVIL);
+}
+
+// The cloud at a place and altitude.
+fn cloud_in(weather: LocalWeather, at: vec2f, altitude: f32) -> Column {
+    let rain = weather.precipitation;
+    let base = params.clouds.base;
+    let height = (altitude - base) / (cloud_top(rain) - base);
     // The noise is at most 1: where the profile alone does not rise above 1 - coverage, nothing does.
     let inside = height > 0.0 && height < 1.0;
-    let limit = select(0.0, with_coverage(profile, weather.coverage), inside);
-    return Column(limit, profile, weather.coverage, height, weather.precipitation, vec3f(at, altitude));
+    var column = Column(0.0, 0.0, weather.coverage, height, rain, vec3f(at, altitude), CLOUD);
+    column.profile = select(0.0, height_profile(height, weather.kind, tower(rain)), inside);
+    if RAINY {
+        let spread = anvil(rain, altitude) * saturate(2.0 * weather.coverage);
+        column.profile = max(column.profile, spread);
+        column.coverage = max(column.coverage, spread);
+        column.height = min(height, 1.0);
+    }
+    column.limit = with_coverage(column.profile, column.coverage);
+    return column;
+}
+
+// The deck above, with a weather and a wind of its own.
+fn upper_cloud_at(p: vec3f, altitude: f32, broad: vec4f) -> Column {
+    let base = params.upper_clouds.base;
+    let height = (altitude - base) / (params.upper_clouds.top - base);
+    let lean = height * params.upper_clouds.shear * frame.upper_direction;
+    let at = vec3f(p.xy - lean, altitude) / params.upper_clouds.scale;
+    let texel = weather_texel(frame.upper_weather_origin, at.xy, broad);
+    let coverage = saturate(texel.r + 2.0 * params.upper_clouds.coverage - 1.0);
+    let kind = saturate(texel.g + 2.0 * params.upper_clouds.type_ - 1.0);
+    let profile = height_profile(height, kind, 0.0);
+    let inside = height > 0.0 && height < 1.0;
+    let limit = select(0.0, with_coverage(profile, coverage), inside);
+    return Column(limit, profile, coverage, height, 0.0, at, UPPER_CLOUD);
+}
+
+// Streaks are so many times longer than wide.
+const RAIN_STRETCH = 12.0;
+
+// Rain below the base, thinned by the air that it falls through.
+fn rain_below(weather: LocalWeather, at: vec2f, altitude: f32) -> Column {
+    let height = altitude / params.clouds.base;
+    let wet = weather.precipitation * weather.coverage;
+    let limit = select(0.0, saturate(2.0 * wet - 0.6 + 0.6 * height), altitude > 0.0);
+    let streak = vec3f(at, altitude / RAIN_STRETCH);
+    return Column(limit, 1.0, 1.0, 0.0, weather.precipitation, streak, RAIN);
 }
 
 // The base shape, before detail: cheap, and never smaller than the density. `width` is the size of what one sample
@@ -93,11 +219,20 @@ fn cloud_shape(column: Column, width: f32) -> f32 {
     if VOLUME {
         return select(0.0, volume_density(column.at), column.limit > 0.0);
     }
-    let lod = log2(max(width * 128.0 / params.clouds.shape_scale, 1.0));
-    let at = frame.shape_origin + column.at / params.clouds.shape_scale;
-    let noise = textureSampleLevel(shape_noise, repeat_sampler, at, lod);
-    let shape = with_coverage(base_shape(noise) * column.profile, column.coverage);
+    let upper = UPPER && column.medium == UPPER_CLOUD;
+    let lod = log2(max(scaled(width, upper) * 128.0 / params.clouds.shape_scale, 1.0));
+    let origin = select(frame.shape_origin, frame.upper_shape_origin, upper);
+    let noise = textureSampleLevel(shape_noise, repeat_sampler, origin + column.at / params.clouds.shape_scale, lod);
+    var shape = with_coverage(base_shape(noise) * column.profile, column.coverage);
+    if RAIN_SHAFTS && column.medium == RAIN {
+        shape = column.limit * remap01(noise.r, 0.1, 0.9);
+    }
     return select(0.0, shape, column.limit > 0.0);
+}
+
+// A width, where the noises of the upper deck are scaled.
+fn scaled(width: f32, upper: bool) -> f32 {
+    return width / select(1.0, params.upper_clouds.scale, upper);
 }
 
 // The density at a point whose shape is known.
@@ -105,13 +240,23 @@ fn cloud_density(column: Column, shape: f32, width: f32) -> f32 {
     if VOLUME {
         return shape;
     }
-    let curl_at = frame.curl_origin + column.at.xy / params.clouds.curl_scale;
+    let upper = UPPER && column.medium == UPPER_CLOUD;
+    let curl_at = select(frame.curl_origin, frame.upper_curl_origin, upper) + column.at.xy / params.clouds.curl_scale;
     let swirl = textureSampleLevel(curl_noise, repeat_sampler, curl_at, 0.0).xy;
     let moved = column.at + vec3f(params.clouds.curl * (1.0 - column.height) * swirl, 0.0);
-    let lod = log2(max(width * 32.0 / params.clouds.detail_scale, 1.0));
-    let at = frame.detail_origin + moved / params.clouds.detail_scale;
+    let lod = log2(max(scaled(width, upper) * 32.0 / params.clouds.detail_scale, 1.0));
+    let at = select(frame.detail_origin, frame.upper_detail_origin, upper) + moved / params.clouds.detail_scale;
     let detail = fbm3(textureSampleLevel(detail_noise, repeat_sampler, at, lod).rgb);
-    return eroded(shape, detail, column.height);
+    return with_share(column, eroded(shape, detail, column.height), shape);
+}
+
+// The density of a medium as a share of `frame.extinction`: of cloud that has been eroded, or of rain, which is not.
+fn with_share(column: Column, cloud: f32, rain: f32) -> f32 {
+    if !(UPPER || RAIN_SHAFTS) {
+        return cloud;
+    }
+    var density = cloud * select(frame.share, frame.upper_share, column.medium == UPPER_CLOUD);
+    return select(density, rain * frame.rain_share, column.medium == RAIN);
 }
 
 // The density with everything read.
@@ -122,9 +267,10 @@ fn cloud_density_at(p: vec3f, altitude: f32, width: f32) -> f32 {
 
 // The density without reading the detail: eroded by its mean instead, so that light samples keep their mean.
 fn cloud_density_cheap(p: vec3f, altitude: f32, width: f32) -> f32 {
-    let shape = cloud_shape(cloud_column(p, altitude), width);
+    let column = cloud_column(p, altitude);
+    let shape = cloud_shape(column, width);
     if VOLUME {
         return shape;
     }
-    return remap01(shape, 0.5 * params.clouds.detail, 1.0);
+    return with_share(column, remap01(shape, 0.5 * params.clouds.detail, 1.0), shape);
 }

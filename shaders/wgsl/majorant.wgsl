@@ -19,14 +19,16 @@ fn majorant_at(p: vec3f, altitude: f32) -> Majorant {
         cell = (volume_cell(p) + 0.5) / f32(BRICK);
         reach = f32(BRICK) * frame.voxel;
     } else {
-        let thickness = params.clouds.top - params.clouds.base;
-        let height = (altitude - params.clouds.base) / thickness;
-        let at = p.xy - height * params.wind.shear * frame.wind_direction;
-        let uv = frame.weather_origin + vec2f(at.x, -at.y) / params.weather.extent;
+        let thickness = frame.shell_top - frame.shell_base;
+        let height = (altitude - frame.shell_base) / thickness;
+        let at = leant(p.xy, altitude);
+        let uv = weather_uv(frame.weather_origin, at, broad_weather(p.xy));
         cell = vec3f(uv - floor(uv), height) * size;
-        // Going up a metre also goes sideways in the map, by the wind's lean.
-        let lean = abs(params.wind.shear) / thickness;
-        reach = min(params.weather.extent / max(size.x, size.y) / (1.0 + lean), thickness / size.z);
+        // Going up a metre also goes sideways in the map, by the wind's lean, and across by more where the map is bent.
+        let lean = abs(params.wind.shear) / (params.clouds.top - params.clouds.base);
+        let bend = select(0.0, frame.broad_stretch, BROAD_WEATHER);
+        let across = params.weather.extent / max(size.x, size.y) / (1.0 + lean) / (1.0 + bend);
+        reach = min(across, thickness / size.z);
     }
     let texel = vec3i(clamp(floor(cell), vec3f(0.0), size - 1.0));
     return Majorant(textureLoad(majorants, texel, 0).r, reach);

@@ -80,13 +80,17 @@ fn finest_feature() -> f32 {
     if VOLUME {
         return 1e30;
     }
-    let profile = (params.clouds.top - params.clouds.base) / 128.0;
-    return min(min(params.clouds.shape_scale / 128.0, params.clouds.detail_scale / 32.0), profile);
+    let noise = min(params.clouds.shape_scale / 128.0, params.clouds.detail_scale / 32.0);
+    return min(select(1.0, min(params.upper_clouds.scale, 1.0), UPPER) * noise, thinnest_deck() / 128.0);
+}
+
+fn thinnest_deck() -> f32 {
+    let lower = params.clouds.top - params.clouds.base;
+    return select(lower, min(lower, params.upper_clouds.top - params.upper_clouds.base), UPPER);
 }
 
 // The longest panel that sees what no level of detail smooths: the profile by height, and a texel of the weather map.
 fn coarsest_panel() -> f32 {
-    let thickness = params.clouds.top - params.clouds.base;
-    let texel = params.weather.extent / f32(textureDimensions(weather_map).x);
-    return max(min(thickness / 16.0, 2.0 * texel), 2.0 * finest_feature());
+    let texel = select(1.0, params.upper_clouds.scale, UPPER) * params.weather.extent / f32(textureDimensions(weather_map).x);
+    return max(min(thinnest_deck() / 16.0, 2.0 * texel), 2.0 * finest_feature());
 }

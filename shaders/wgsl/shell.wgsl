@@ -90,8 +90,8 @@ fn cloud_stretches_from(p: vec3f, direction: vec3f) -> Stretches {
         return box_stretch(p, direction, 1e30);
     }
     return stretches_between(
-        hit_sphere_from(p, direction, params.clouds.top),
-        hit_sphere_from(p, direction, params.clouds.base),
+        hit_sphere_from(p, direction, frame.shell_top),
+        hit_sphere_from(p, direction, frame.shell_base),
         1e30,
     );
 }

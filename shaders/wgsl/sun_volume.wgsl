@@ -34,17 +34,17 @@ fn stack_coordinates(p: vec2f, height: f32, level: u32) -> vec3f {
 }
 
 fn height_at(altitude: f32) -> f32 {
-    return (altitude - params.clouds.base) / (params.clouds.top - params.clouds.base);
+    return (altitude - frame.shell_base) / (frame.shell_top - frame.shell_base);
 }
 
 // Optical depth from a point to the sun, as it is baked.
 fn sun_volume_depth(given: vec3f, level: u32) -> f32 {
     let altitude = altitude_at(given);
     // Light from below has crossed the clouds beyond the horizon.
-    let inner = hit_sphere_from(given, frame.sun_direction, params.clouds.base);
-    let under = altitude < params.clouds.base && inner.hit;
+    let inner = hit_sphere_from(given, frame.sun_direction, frame.shell_base);
+    let under = altitude < frame.shell_base && inner.hit;
     let p = given + select(0.0, inner.far, under) * frame.sun_direction;
-    let height = height_at(select(altitude, params.clouds.base, under));
+    let height = height_at(select(altitude, frame.shell_base, under));
     let at = stack_coordinates(p.xy, height, max(level, level_at(p.xy)));
     let depth = -log(max(textureSampleLevel(sun_volume, clamp_sampler, at, 0.0), vec4f(1e-7)));
     // Of the rates the highest at which light is left.

@@ -8,7 +8,7 @@ use glam::{DVec2, DVec3, Vec3};
 use crate::camera::{Camera, Projection};
 use crate::params;
 use crate::params::Params;
-use crate::passes::sun_volume;
+use crate::passes::{broad_weather, sun_volume};
 
 params! {
     /// What the renderer knows about a frame.
@@ -97,17 +97,28 @@ params! {
         horizon_dip: f32 = 0.0;
         /// Power of the eye's point for the ground: (h - H)(2R + h + H) for a sphere at altitude H, m^2.
         power_ground: f32 = 0.0;
-        /// The same for the base of the clouds.
+        /// The same for the lowest clouds.
         power_base: f32 = 0.0;
-        /// The same for their top.
+        /// The same for the highest.
         power_top: f32 = 0.0;
         /// The same for the high clouds.
         power_high: f32 = 0.0;
         /// The same for the top of the air.
         power_air: f32 = 0.0;
 
-        /// Extinction where the density is 1, 1/m.
+        /// Lowest altitude of procedural clouds and rain, m.
+        shell_base: f32 = 0.0;
+        /// Highest.
+        shell_top: f32 = 1.0;
+
+        /// Extinction where the density is 1: the largest of clouds, upper clouds and rain, 1/m.
         extinction: f32 = 0.0;
+        /// That of the clouds as a share of it.
+        share: f32 = 1.0;
+        /// That of the upper clouds.
+        upper_share: f32 = 0.0;
+        /// That of the rain.
+        rain_share: f32 = 0.0;
         /// Lowest corner of the user's grid, relative to the eye, m.
         volume_low: [f32; 3] = [0.0; 3];
         /// Highest corner.
@@ -132,6 +143,22 @@ params! {
         curl_origin: [f32; 2] = [0.0, 0.0];
         /// The same in the weather map (v down).
         weather_origin: [f32; 2] = [0.0, 0.0];
+        /// Where the eye stands in the larger weather map (v down).
+        broad_origin: [f32; 2] = [0.0, 0.0];
+        /// By how much of its tile that bends the smaller one, across and down.
+        broad_bend: f32 = 0.0;
+        /// How much longer at most a way in the smaller map becomes by that.
+        broad_stretch: f32 = 0.0;
+        /// Unit vector toward which the upper deck's wind blows.
+        upper_direction: [f32; 2] = [0.0, 1.0];
+        /// As `shape_origin`, for the upper deck.
+        upper_shape_origin: [f32; 3] = [0.0, 0.0, 0.0];
+        /// As `detail_origin`.
+        upper_detail_origin: [f32; 3] = [0.0, 0.0, 0.0];
+        /// As `curl_origin`.
+        upper_curl_origin: [f32; 2] = [0.0, 0.0];
+        /// As `weather_origin`.
+        upper_weather_origin: [f32; 2] = [0.0, 0.0];
         /// The same in the high clouds' texture, along and across their wind.
         high_origin: [f32; 2] = [0.0, 0.0];
         /// The same in the second, broader read of that texture.
@@ -218,6 +245,7 @@ impl Frame {
 
     /// Whether the sun can reach the clouds: false only where `sky_light` is none (passes/sky.wgsl, atmosphere.wgsl).
     pub fn sunlit(&self, params: &Params) -> bool {
+        // Where `sky_light` is worked out; one light for all marched clouds.
         let height = f64::from(0.5 * (params.clouds.base + params.clouds.top));
         let radius = f64::from(params.atmosphere.planet_radius);
         let horizon = -(1.0 - (radius / (radius + height)).powi(2)).max(0.0).sqrt();
@@ -248,15 +276,20 @@ impl Frame {
         self.horizon_dip = (radius / (radius + h.max(0.0))).acos() as f32;
         // An eye under the ground is on it: were the ground to hide nothing from there, it would vanish at z = 0.
         self.power_ground = power(0.0).max(0.0);
-        self.power_base = power(f64::from(params.clouds.base));
-        self.power_top = power(f64::from(params.clouds.top));
+        [self.shell_base, self.shell_top] = params.shell();
+        self.power_base = power(f64::from(self.shell_base));
+        self.power_top = power(f64::from(self.shell_top));
         self.power_high = power(f64::from(params.high_clouds.altitude));
         self.power_air = power(AIR_TOP);
     }
 
     fn set_volume(&mut self, eye: DVec3, params: &Params) {
         let Some(volume) = &params.volume else {
-            self.extinction = params.clouds.extinction;
+            let upper = if params.has_upper_clouds() { params.upper_clouds.extinction } else { 0.0 };
+            let rain = if params.has_rain_shafts() { params.clouds.rain_extinction } else { 0.0 };
+            self.extinction = params.clouds.extinction.max(upper).max(rain);
+            let share = |extinction| if self.extinction > 0.0 { extinction / self.extinction } else { 0.0 };
+            [self.share, self.upper_share, self.rain_share] = [params.clouds.extinction, upper, rain].map(share);
             return;
         };
         let [low, high] = volume.bounds();
@@ -266,6 +299,27 @@ impl Frame {
         self.volume_high = (high - eye).as_vec3().to_array();
         self.volume_scale = (voxels / (high - low)).as_vec3().to_array();
         self.voxel = ((high - low) / voxels).min_element() as f32;
+    }
+
+    /// The noises and the weather of the upper deck, which are scaled with it.
+    fn set_upper_wind(&mut self, eye: DVec3, params: &Params, time: f64) {
+        let (clouds, upper) = (&params.clouds, &params.upper_clouds);
+        let scale = f64::from(upper.scale);
+        let direction = compass(f64::from(upper.direction));
+        // Its edges boil as those below do.
+        let boil = f64::from(params.wind.detail_speed - params.wind.speed);
+        let rise = -f64::from(params.wind.updraft) * time;
+        let drifted = |faster: f64| (eye.truncate() - direction * (f64::from(upper.speed) + faster) * time) / scale;
+        let plane = |at: DVec2, scale: f32| [wrap(at.x, scale), wrap(at.y, scale)];
+        let volume = |at: DVec2, tile: f32| [wrap(at.x, tile), wrap(at.y, tile), wrap(rise / scale, tile)];
+        self.upper_direction = direction.as_vec2().to_array();
+        self.upper_shape_origin = volume(drifted(0.0), clouds.shape_scale);
+        self.upper_detail_origin = volume(drifted(boil), clouds.detail_scale);
+        self.upper_curl_origin = plane(drifted(boil), clouds.curl_scale);
+        // Another part of the map, or one deck would stand on the other.
+        let extent = f64::from(params.weather.extent);
+        let weather = drifted(0.0) + DVec2::new(0.37, 0.61) * extent;
+        self.upper_weather_origin = plane(DVec2::new(weather.x, -weather.y), params.weather.extent);
     }
 
     fn set_wind(&mut self, eye: DVec3, params: &Params, time: f64) {
@@ -285,6 +339,15 @@ impl Frame {
             eye.truncate() - compass(f64::from(wind.weather_direction)) * f64::from(wind.weather_speed) * time;
         let half = 0.5 * f64::from(params.weather.extent);
         self.weather_origin = plane(DVec2::new(weather.x + half, half - weather.y), params.weather.extent);
+
+        let broad = f64::from(params.weather.broad_extent) * 0.5;
+        self.broad_origin = plane(DVec2::new(weather.x + broad, broad - weather.y), params.weather.broad_extent);
+        if params.weather.broad_map.is_none() {
+            self.broad_bend = broad_weather::BEND;
+            let ways = f64::from(broad_weather::BEND * params.weather.extent / params.weather.broad_extent);
+            self.broad_stretch = (ways * broad_weather::STEEPEST) as f32;
+        }
+        self.set_upper_wind(eye, params, time);
 
         let along = compass(f64::from(high.direction));
         let across = DVec2::new(-along.y, along.x);

@@ -20,7 +20,7 @@ fn python_type(field: &Field) -> String {
         Type::Choice(names) => {
             format!("Literal[{}]", names.iter().map(|name| format!("{name:?}")).collect::<Vec<_>>().join(", "))
         }
-        Type::Map => "npt.NDArray[np.float32] | None".into(),
+        Type::Map(_) => "npt.NDArray[np.float32] | None".into(),
     }
 }
 
@@ -69,7 +69,8 @@ fn dataclass(out: &mut String, block: &dyn Block) {
     out.push_str("\n    Attributes\n    ----------\n");
     for field in block.fields() {
         let ty = match field.ty {
-            Type::Map => "array of float32, shape (H, W, 3), or None".into(),
+            Type::Map(1) => "array of float32, shape (H, W), or None".into(),
+            Type::Map(channels) => format!("array of float32, shape (H, W, {channels}), or None"),
             Type::Choice(names) => format!("{{{}}}", names.join(", ")),
             _ => python_type(field),
         };

@@ -58,6 +58,16 @@ pub(crate) struct Variant {
     pub sunlit: bool,
     /// Whether light is read from the sun volume.
     pub sun_volume: bool,
+    /// Whether it may rain.
+    pub rainy: bool,
+    /// Whether rain is seen.
+    pub rain_shafts: bool,
+    /// Whether there is a second deck.
+    pub upper: bool,
+    /// Whether a larger map shifts the weather.
+    pub broad: bool,
+    /// Whether the profile by height is the user's table.
+    pub profile_table: bool,
     /// Whether there are light samples that see the detail.
     pub light_detail: bool,
     /// Whether there are light samples that do not.
@@ -82,6 +92,11 @@ impl Variant {
             precise: quality.tolerance > 0.0 || model == Model::Path,
             sunlit: true,
             sun_volume: quality.sun_volume && params.volume.is_none(),
+            rainy: params.is_rainy(),
+            rain_shafts: params.has_rain_shafts(),
+            upper: params.has_upper_clouds(),
+            broad: params.has_broad_weather(),
+            profile_table: params.clouds.profile.is_some() && params.volume.is_none(),
             light_detail: quality.cheap_light > 0.0,
             light_cheap: quality.cheap_light < 1.0 || quality.far_sample,
             // What single passes ask for beside.
@@ -102,7 +117,7 @@ impl Variant {
         Self { sunlit: frame.sunlit(params), camera: frame.camera_kind, ..Self::new(params, quality) }
     }
 
-    fn constants(self) -> [(&'static str, f64); 11] {
+    fn constants(self) -> [(&'static str, f64); 16] {
         let switch = |on| f64::from(u8::from(on));
         [
             ("MODEL", f64::from(self.model as u32)),
@@ -110,6 +125,11 @@ impl Variant {
             ("PRECISE", switch(self.precise)),
             ("SUNLIT", switch(self.sunlit)),
             ("SUN_VOLUME", switch(self.sun_volume)),
+            ("RAINY", switch(self.rainy)),
+            ("RAIN_SHAFTS", switch(self.rain_shafts)),
+            ("UPPER", switch(self.upper)),
+            ("BROAD_WEATHER", switch(self.broad)),
+            ("PROFILE_TABLE", switch(self.profile_table)),
             ("LIGHT_DETAIL", switch(self.light_detail)),
             ("LIGHT_CHEAP", switch(self.light_cheap)),
             ("CAMERA", f64::from(self.camera)),

@@ -6,7 +6,7 @@
 use std::sync::Arc;
 
 use crate::error::{Error, Result};
-use crate::schema::{self, Block, Map};
+use crate::schema::{self, Block, Map, Table};
 use crate::volume::DensityGrid;
 use crate::{choice, params};
 
@@ -58,12 +58,19 @@ params! {
         coverage: f32 = 0.45, in 0..=1 "";
         /// Cloud type: 0 stratus, 0.5 stratocumulus, 1 cumulus. Shifts the weather map's type, 0.5 the map as it is.
         r#type: f32 = 0.85, in 0..=1 "";
-        /// Rain: thickens and darkens the clouds (nubis2015). Scales the weather map's precipitation, 0 is dry.
+        /// Rain: thickens and darkens the clouds and lets them grow to cumulonimbus (nubis2015). Scales the weather map's
+        /// precipitation, 0 is dry.
         precipitation: f32 = 0.0, in 0..=1 "";
         /// Altitude of the cloud base.
         base: f32 = 1200.0, in 0..=20000 "m";
-        /// Altitude of the highest cloud tops.
+        /// Altitude of the highest cloud tops where there is no rain.
         top: f32 = 3200.0, in 1..=25000 "m";
+        /// Altitude of the tops of cumulonimbus, where precipitation is 1 (nubis2015: 8 km).
+        cumulonimbus_top: f32 = 8000.0, in 1..=25000 "m";
+        /// How far the tops of cumulonimbus spread.
+        anvil: f32 = 0.5, in 0..=1 "";
+        /// Extinction of the rain that is seen below the clouds where it is heaviest; 0 hides it.
+        rain_extinction: f32 = 0.0, in 0..=1 "1/m";
         /// Extinction where the density is 1.
         extinction: f32 = 0.15, in 0..=100000000 "1/m";
         /// Which random shapes.
@@ -80,6 +87,40 @@ params! {
         curl_scale: f32 = 1600.0, in 10..=50000 "m";
         /// How far curl noise displaces the detail at the base.
         curl: f32 = 70.0, in 0..=2000 "m";
+        /// Where the density of stratus rises from 0 to 1 and where it falls back, as fractions of its height (nubis2015,
+        /// figure 4.10; vsu2022's gradients).
+        stratus: [f32; 4] = [0.02, 0.05, 0.09, 0.11], in 0..=1 "";
+        /// The same for stratocumulus.
+        stratocumulus: [f32; 4] = [0.02, 0.12, 0.35, 0.60], in 0..=1 "";
+        /// The same for cumulus.
+        cumulus: [f32; 4] = [0.01, 0.07, 0.25, 1.0], in 0..=1 "";
+        /// The same for cumulonimbus.
+        cumulonimbus: [f32; 4] = [0.005, 0.04, 0.8, 1.0], in 0..=1 "";
+        /// Density by height and type in place of the first three: row 0 at the tops, column 0 type 0 (Frostbite 2016).
+        profile: Option<Table> = None, in 0..=1 "";
+    }
+
+    /// A second deck of volumetric clouds, above the first. Its weather is another part of the same map, and its noises are
+    /// those of the first at another scale.
+    UpperClouds {
+        /// How much of the sky it covers: as `clouds.coverage`; 0 is none.
+        coverage: f32 = 0.0, in 0..=1 "";
+        /// Cloud type: as `clouds.type`.
+        r#type: f32 = 0.5, in 0..=1 "";
+        /// Altitude of its base.
+        base: f32 = 4800.0, in 0..=25000 "m";
+        /// Altitude of its tops.
+        top: f32 = 5600.0, in 1..=25000 "m";
+        /// Extinction where the density is 1.
+        extinction: f32 = 0.06, in 0..=100000000 "1/m";
+        /// Size of its clouds, as a share of the size of those below.
+        scale: f32 = 0.4, in 0.01..=100 "";
+        /// Compass direction toward which its wind blows, clockwise from north.
+        direction: f32 = 95.0, in -360..=360 "degrees";
+        /// Speed of that wind.
+        speed: f32 = 16.0, in -1000..=1000 "m/s";
+        /// How far its tops lean downwind.
+        shear: f32 = 150.0, in -20000..=20000 "m";
     }
 
     /// The weather map: where the clouds stand.
@@ -94,6 +135,13 @@ params! {
         scale: f32 = 5000.0, in 100..=1000000 "m";
         /// How much the cover varies over distances of several clouds.
         variety: f32 = 0.5, in 0..=1 "";
+        /// How much a second, larger map shifts the weather, by seed or `broad_map`, so that no part of the sky looks like
+        /// another; 0 leaves the first map as it is. The baked one leaves a `map` of yours alone.
+        broad_variety: f32 = 0.3, in 0..=1 "";
+        /// Width of the square that the larger map covers; beyond it, that repeats.
+        broad_extent: f32 = 430000.0, in 100..=10000000 "m";
+        /// A larger map of your own: shifts of coverage, type and precipitation, 0.5 is none.
+        broad_map: Option<Arc<Map>> = None, in 0..=1 "";
     }
 
     /// What moves the clouds.
@@ -246,6 +294,7 @@ params! {
 pub struct Params {
     pub sun: Sun,
     pub clouds: Clouds,
+    pub upper_clouds: UpperClouds,
     pub weather: Weather,
     pub wind: Wind,
     pub high_clouds: HighClouds,
@@ -257,10 +306,11 @@ pub struct Params {
 
 impl Params {
     /// The blocks with their names.
-    pub fn blocks(&self) -> [(&'static str, &dyn Block); 7] {
+    pub fn blocks(&self) -> [(&'static str, &dyn Block); 8] {
         [
             ("sun", &self.sun),
             ("clouds", &self.clouds),
+            ("upper_clouds", &self.upper_clouds),
             ("weather", &self.weather),
             ("wind", &self.wind),
             ("high_clouds", &self.high_clouds),
@@ -270,10 +320,11 @@ impl Params {
     }
 
     /// The same, to set them.
-    pub fn blocks_mut(&mut self) -> [(&'static str, &mut dyn Block); 7] {
+    pub fn blocks_mut(&mut self) -> [(&'static str, &mut dyn Block); 8] {
         [
             ("sun", &mut self.sun),
             ("clouds", &mut self.clouds),
+            ("upper_clouds", &mut self.upper_clouds),
             ("weather", &mut self.weather),
             ("wind", &mut self.wind),
             ("high_clouds", &mut self.high_clouds),
@@ -291,7 +342,64 @@ impl Params {
             let base = self.clouds.base;
             return Err(Error::parameter("clouds.top", self.clouds.top, format!("above clouds.base = {base} m")));
         }
+        let Clouds { stratus, stratocumulus, cumulus, cumulonimbus, .. } = self.clouds;
+        let edges = [("stratus", stratus), ("stratocumulus", stratocumulus), ("cumulus", cumulus)];
+        for (name, edges) in edges.into_iter().chain([("cumulonimbus", cumulonimbus)]) {
+            if !edges.is_sorted() {
+                let name = format!("clouds.{name}");
+                return Err(Error::parameter(&name, format!("{edges:?}"), "four fractions of the height in rising order"));
+            }
+        }
+        let upper = &self.upper_clouds;
+        if upper.top <= upper.base {
+            let allowed = format!("above upper_clouds.base = {} m", upper.base);
+            return Err(Error::parameter("upper_clouds.top", upper.top, allowed));
+        }
+        if upper.coverage > 0.0 && upper.base < self.clouds.top {
+            let allowed = format!("at or above clouds.top = {} m where upper_clouds.coverage is not 0", self.clouds.top);
+            return Err(Error::parameter("upper_clouds.base", upper.base, allowed));
+        }
         Ok(())
+    }
+
+    /// Whether there are marched clouds at all.
+    pub fn has_clouds(&self) -> bool {
+        self.volume.is_some() || self.clouds.coverage > 0.0 || self.has_upper_clouds()
+    }
+
+    /// Whether there is a second deck.
+    pub fn has_upper_clouds(&self) -> bool {
+        self.volume.is_none() && self.upper_clouds.coverage > 0.0
+    }
+
+    /// Whether it can rain.
+    pub fn is_rainy(&self) -> bool {
+        self.volume.is_none() && self.clouds.coverage > 0.0 && self.clouds.precipitation > 0.0
+    }
+
+    /// Whether rain is seen below the clouds.
+    pub fn has_rain_shafts(&self) -> bool {
+        self.is_rainy() && self.clouds.rain_extinction > 0.0
+    }
+
+    /// Whether a second, larger map shifts the weather.
+    pub fn has_broad_weather(&self) -> bool {
+        let weather = &self.weather;
+        self.volume.is_none() && weather.broad_variety > 0.0 && (weather.map.is_none() || weather.broad_map.is_some())
+    }
+
+    /// The lowest and the highest altitude at which there can be procedural clouds or visible rain, m.
+    pub fn shell(&self) -> [f32; 2] {
+        let (clouds, upper) = (&self.clouds, &self.upper_clouds);
+        let lower = if clouds.coverage > 0.0 || !self.has_upper_clouds() {
+            // Where it rains less there is neither tower nor anvil (density.wgsl).
+            let storms = self.is_rainy() && clouds.precipitation > 0.2;
+            let base = if self.has_rain_shafts() { 0.0 } else { clouds.base };
+            [base, if storms { clouds.top.max(clouds.cumulonimbus_top) } else { clouds.top }]
+        } else {
+            [upper.base, upper.top]
+        };
+        if self.has_upper_clouds() { [lower[0], lower[1].max(upper.top)] } else { lower }
     }
 }
 
@@ -382,11 +490,12 @@ fn check_block(name: &str, block: &dyn Block) -> Result<()> {
 
 /// A block by the name that Python calls its type: every block of [`Params`], and [`Quality`].
 pub fn block(type_name: &str) -> Option<Box<dyn Block>> {
-    let Params { sun, clouds, weather, wind, high_clouds, light, atmosphere, volume: _ } = Params::default();
+    let Params { sun, clouds, upper_clouds, weather, wind, high_clouds, light, atmosphere, volume: _ } = Params::default();
     let quality = Quality::default();
-    let blocks: [Box<dyn Block>; 8] = [
+    let blocks: [Box<dyn Block>; 9] = [
         Box::new(sun),
         Box::new(clouds),
+        Box::new(upper_clouds),
         Box::new(weather),
         Box::new(wind),
         Box::new(high_clouds),

@@ -15,11 +15,13 @@ use crate::frame::Frame;
 use crate::gpu::{Gpu, Interrupt, Timings, Work, check_fork};
 use crate::kernel::{Kernel, Variant, Wanted};
 use crate::params::{Model, Params, Quality};
+use crate::passes::broad_weather::BroadWeather;
 use crate::passes::composite::Composed;
 use crate::passes::high_clouds::HighClouds;
 use crate::passes::majorant::Majorants;
 use crate::passes::march::Marched;
 use crate::passes::noise::Noise;
+use crate::passes::profile::Profile;
 use crate::passes::rays::Rays;
 use crate::passes::refine::{COARSEST, Refined};
 use crate::passes::reproject::{ORDER, STRIDE};
@@ -232,7 +234,7 @@ impl Renderer {
         frame.first_sample = first_sample;
         let method = Method::new(params, &self.quality);
         frame.cloudless =
-            u32::from(params.volume.is_none() && params.clouds.coverage == 0.0 && method == Method::March);
+            u32::from(!params.has_clouds() && method == Method::March);
         let Self { gpu, world, quality, timings, .. } = self;
         let variant = Variant::of_frame(params, quality, &frame);
         let scene = gpu.compiling(&method.kernels(quality, &frame, variant, all), || {
@@ -538,6 +540,8 @@ struct World {
     blue_noise: wgpu::TextureView,
     noise: Option<Arc<Noise>>,
     weather: Weather,
+    broad_weather: BroadWeather,
+    profile: Profile,
     high_clouds: HighClouds,
     sky: Sky,
     volume: Volume,
@@ -558,6 +562,8 @@ impl World {
             blue_noise: texture.create_view(&wgpu::TextureViewDescriptor::default()),
             noise: None,
             weather: Weather::new(),
+            broad_weather: BroadWeather::new(),
+            profile: Profile::new(),
             high_clouds: HighClouds::new(),
             sky: Sky::new(),
             volume: Volume::new(),
@@ -585,6 +591,8 @@ impl World {
 
         let noise = self.noise.insert(Noise::run(&mut ctx, params)?); // once for a seed
         let weather = self.weather.run(&mut ctx, params)?; // when its block changes
+        let broad_weather = self.broad_weather.run(&mut ctx, params)?; // for a seed, or once for a map
+        let profile = self.profile.run(&ctx, params)?; // once for a table
         let high_clouds = self.high_clouds.run(&mut ctx, params, frame)?; // as they evolve
         let sky = self.sky.run(&mut ctx, params, frame, at.0)?; // when sun or air change, or the eye has gone far
 
@@ -594,7 +602,7 @@ impl World {
         let blue_noise = vec![("blue_noise", (&self.blue_noise).into())];
         let uniforms = self.uniforms.bindings();
         let mut bindings: Bindings<'_> =
-            [uniforms, noise.bindings(), weather, high_clouds, sky, volume, blue_noise].concat();
+            [uniforms, noise.bindings(), weather, broad_weather, profile, high_clouds, sky, volume, blue_noise].concat();
         let majorants = self.majorants.run(&mut ctx, params, &bindings)?; // when paths are traced
         bindings.extend(majorants);
         let sun_volume = self.sun_volume.run(&mut ctx, params, frame, at, &bindings)?; // as clouds and eye move

@@ -19,8 +19,8 @@ pub enum Type {
     Vector(usize),
     /// One of a few words; its index is a `u32` in WGSL.
     Choice(&'static [&'static str]),
-    /// Nothing, or an image of three channels: it reaches the GPU as a texture and not in the uniform.
-    Map,
+    /// Nothing, or an image of so many channels: it reaches the GPU as a texture and not in the uniform.
+    Map(usize),
 }
 
 impl Type {
@@ -29,7 +29,7 @@ impl Type {
         match self {
             Self::F32 | Self::U32 | Self::Bool | Self::Choice(_) => 1,
             Self::Vector(n) => n,
-            Self::Map => 0,
+            Self::Map(_) => 0,
         }
     }
 
@@ -48,25 +48,27 @@ impl Type {
             Self::F32 => "f32".into(),
             Self::Vector(n) => format!("vec{n}f"),
             Self::U32 | Self::Bool | Self::Choice(_) => "u32".into(),
-            Self::Map => unreachable!("maps are textures"),
+            Self::Map(_) => unreachable!("maps are textures"),
         }
     }
 }
 
-/// An image of `height` rows of `width` pixels of three channels, row by row.
+/// An image of `height` rows of `width` pixels, row by row.
 #[derive(Clone, PartialEq)]
 pub struct Map {
     /// Pixels in a row.
     pub width: usize,
     /// Rows.
     pub height: usize,
-    /// `3 * width * height` numbers.
+    /// Numbers of a pixel.
+    pub channels: usize,
+    /// `width * height * channels` numbers.
     pub data: Vec<f32>,
 }
 
 impl fmt::Debug for Map {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "Map({} x {})", self.width, self.height)
+        write!(f, "Map({} x {} x {})", self.width, self.height, self.channels)
     }
 }
 
@@ -134,8 +136,9 @@ impl Field {
             Type::Bool => "True or False".into(),
             Type::Vector(n) => format!("{n} numbers from {min} to {max}{unit}"),
             Type::Choice(names) => format!("one of {names:?}").replace(['[', ']'], ""),
-            Type::Map => {
-                format!("None or a float array of shape (H, W, 3), H and W from 1 to 8192, values from {min} to {max}")
+            Type::Map(channels) => {
+                let shape = if channels == 1 { "(H, W)".into() } else { format!("(H, W, {channels})") };
+                format!("None or a float array of shape {shape}, H and W from 1 to 8192, values from {min} to {max}")
             }
         }
     }
@@ -158,9 +161,9 @@ impl Field {
                 (v.len() == n && v.iter().all(|v| in_range(*v))).then(|| value.clone())
             }
             (Type::Choice(names), Value::Text(v)) => names.contains(&v.as_str()).then(|| value.clone()),
-            (Type::Map, Value::None) => Some(Value::None),
-            (Type::Map, Value::Map(map)) => {
-                let sized = (1..=8192).contains(&map.width) && (1..=8192).contains(&map.height);
+            (Type::Map(_), Value::None) => Some(Value::None),
+            (Type::Map(channels), Value::Map(map)) => {
+                let sized = [map.width, map.height].iter().all(|side| (1..=8192).contains(side));
                 if let Some(bad) = map.data.iter().find(|v| !in_range(f64::from(**v))) {
                     return Err(Error::parameter(
                         &format!("{block}.{}", self.name),
@@ -168,7 +171,7 @@ impl Field {
                         self.allowed(),
                     ));
                 }
-                sized.then(|| value.clone())
+                (sized && map.channels == channels).then(|| value.clone())
             }
             _ => None,
         };
@@ -257,8 +260,23 @@ impl<const N: usize> Typed for [f32; N] {
     }
 }
 
+/// An image of one channel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Table(pub Arc<Map>);
+
+impl Typed for Option<Table> {
+    const TYPE: Type = Type::Map(1);
+    fn from_value(value: &Value) -> Option<Self> {
+        Option::<Arc<Map>>::from_value(value).map(|map| map.map(Table))
+    }
+    fn to_value(&self) -> Value {
+        self.as_ref().map(|Table(map)| map.clone()).to_value()
+    }
+    fn write(&self, _out: &mut [u32]) {}
+}
+
 impl Typed for Option<Arc<Map>> {
-    const TYPE: Type = Type::Map;
+    const TYPE: Type = Type::Map(3);
     fn from_value(value: &Value) -> Option<Self> {
         match value {
             Value::Map(v) => Some(Some(v.clone())),

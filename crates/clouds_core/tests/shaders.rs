@@ -49,7 +49,7 @@ fn check_block(module: &naga::Module, block: &dyn Block) {
     let ours: Vec<_> = block
         .fields()
         .iter()
-        .filter(|field| field.ty != Type::Map)
+        .filter(|field| !matches!(field.ty, Type::Map(_)))
         .map(|field| (wgsl_name(field.name).to_owned(), field.offset as u32, 4 * field.ty.words() as u32))
         .collect();
     assert_eq!(members, ours, "{}", block.type_name());

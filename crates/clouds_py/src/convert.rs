@@ -6,7 +6,7 @@ use clouds_core::Error;
 use clouds_core::params::{Params, Quality};
 use clouds_core::schema::{self, Block, Map, Value};
 use glam::DVec3;
-use numpy::{PyArray1, PyArrayMethods as _, PyReadonlyArray3, PyUntypedArray, PyUntypedArrayMethods as _};
+use numpy::{PyArray1, PyArrayMethods as _, PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods as _};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyBytes, PyDict, PyInt, PyString, PyTuple};
 
@@ -70,7 +70,12 @@ fn shown(value: &Bound<'_, PyAny>) -> String {
 fn map_from_python(value: &Bound<'_, PyAny>, array: &Bound<'_, PyUntypedArray>) -> PyResult<Value> {
     let shape = array.shape().to_vec();
     let kind: String = array.dtype().getattr("kind")?.extract()?;
-    if shape.len() != 3 || shape[2] != 3 || !"fiu".contains(&kind) {
+    let channels = match shape[..] {
+        [_, _] => 1,
+        [_, _, channels] => channels,
+        _ => 0,
+    };
+    if channels == 0 || !"fiu".contains(&kind) {
         return Ok(Value::Text(format!("array of shape {shape:?} and dtype {}", array.dtype())));
     }
     let kwargs = PyDict::new(value.py());
@@ -80,9 +85,9 @@ fn map_from_python(value: &Bound<'_, PyAny>, array: &Bound<'_, PyUntypedArray>) 
     let Ok(numbers) = numpy.call_method("ascontiguousarray", (value,), Some(&kwargs)) else {
         return Ok(Value::Text(format!("array of shape {shape:?} with numbers beyond float32")));
     };
-    let numbers: PyReadonlyArray3<'_, f32> = numbers.extract()?;
+    let numbers: PyReadonlyArrayDyn<'_, f32> = numbers.extract()?;
     let data = numbers.as_slice()?.to_vec();
-    Ok(Value::Map(Arc::new(Map { width: shape[1], height: shape[0], data })))
+    Ok(Value::Map(Arc::new(Map { width: shape[1], height: shape[0], channels, data })))
 }
 
 /// A value for Python; maps become read-only arrays.
@@ -95,7 +100,10 @@ pub fn value_to_python<'py>(py: Python<'py>, value: &Value) -> PyResult<Bound<'p
         Value::Text(v) => v.into_pyobject(py)?.into_any(),
         Value::Map(map) => {
             let flat = PyArray1::from_vec(py, map.data.clone());
-            let array = flat.reshape([map.height, map.width, 3])?.into_any();
+            let array = match map.channels {
+                1 => flat.reshape([map.height, map.width])?.into_any(),
+                channels => flat.reshape([map.height, map.width, channels])?.into_any(),
+            };
             array.getattr("flags")?.setattr("writeable", false)?;
             array
         }

@@ -44,10 +44,36 @@ fn majorant_weather(@builtin(global_invocation_id) id: vec3u) {
             least = min(least, texel);
         }
     }
+    if BROAD_WEATHER {
+        // It shifts each by at most as much.
+        most = saturate(most + params.weather.broad_variety);
+        least = saturate(least - params.weather.broad_variety);
+    }
     let wettest = weather_from_map(most);
-    let kinds = vec2f(weather_from_map(least).kind, wettest.kind);
-    let heights = vec2f(f32(id.z), f32(id.z + 1u)) / f32(size.z);
-    let bound = with_coverage(largest_profile(heights, kinds), wettest.coverage);
+    let driest = weather_from_map(least);
+    let altitudes = mix(vec2f(frame.shell_base), vec2f(frame.shell_top), vec2f(f32(id.z), f32(id.z + 1u)) / f32(size.z));
+    let base = params.clouds.base;
+    // From the lowest that the lower side of the cell can be in its cloud to the highest that its upper side can.
+    let heights = vec2f(
+        (altitudes.x - base) / (cloud_top(wettest.precipitation) - base),
+        (altitudes.y - base) / (cloud_top(driest.precipitation) - base),
+    );
+    let profile = largest_profile(heights, vec2f(driest.kind, wettest.kind), tower(wettest.precipitation));
+    var bound = with_coverage(profile, wettest.coverage);
+    if RAINY {
+        // The anvil lies at the top; it rises and falls within more than one cell.
+        let spread = max(anvil(wettest.precipitation, altitudes.x), anvil(wettest.precipitation, altitudes.y));
+        let middle = mix(params.clouds.base, tallest(), 0.84);
+        let whole = altitudes.x < middle && middle < altitudes.y;
+        bound = max(bound, max(spread, select(0.0, anvil(wettest.precipitation, middle), whole)));
+    }
+    if UPPER || RAIN_SHAFTS {
+        bound *= frame.share;
+        // No bound but the largest for what has its own weather.
+        let deck = altitudes.y >= params.upper_clouds.base && altitudes.x <= params.upper_clouds.top;
+        bound = max(bound, select(0.0, frame.upper_share, UPPER && deck));
+        bound = max(bound, select(0.0, frame.rain_share * wettest.precipitation, RAIN_SHAFTS && altitudes.x < base));
+    }
     textureStore(volume_out, id, vec4f(ROUND_UP * bound));
 }
 
@@ -55,18 +81,29 @@ fn wrapped(at: vec2i, size: vec2i) -> vec2i {
     return ((at % size) + size) % size;
 }
 
-// The largest value of `height_profile` between two heights and two types.
-fn largest_profile(heights: vec2f, kinds: vec2f) -> f32 {
-    // Where the profile rises and falls goes from stratus to stratocumulus to cumulus in straight lines.
+// The largest value of `height_profile` between two heights and two types, where it rains so much or less.
+fn largest_profile(heights: vec2f, kinds: vec2f, rain: f32) -> f32 {
+    if heights.y <= 0.0 || heights.x >= 1.0 {
+        return 0.0;
+    }
+    if PROFILE_TABLE {
+        return 1.0;
+    }
+    // Where the profile rises and falls goes from stratus to stratocumulus to cumulus to cumulonimbus in straight lines.
     let middle = clamp(0.5, kinds.x, kinds.y);
-    let a = profile_edges(kinds.x);
-    let b = profile_edges(middle);
-    let c = profile_edges(kinds.y);
-    let first = min(min(a, b), c);
-    let last = max(max(a, b), c);
+    let a = profile_edges(kinds.x, 0.0);
+    let b = profile_edges(middle, 0.0);
+    let c = profile_edges(kinds.y, 0.0);
+    var first = min(min(a, b), c);
+    var last = max(max(a, b), c);
+    if RAINY {
+        first = min(first, mix(first, params.clouds.cumulonimbus, rain));
+        last = max(last, mix(last, params.clouds.cumulonimbus, rain));
+    }
     // It rises to at most that of the earliest rise at the upper height, and falls at least that of the latest fall at
     // the lower one.
-    return remap01(heights.y, first.x, first.y) * (1.0 - smoothstep(last.z, last.w, heights.x));
+    let rise = remap01(heights.y, first.x, first.y);
+    return rise * (1.0 - smoothstep(last.z, max(last.w, last.z + 1e-4), heights.x));
 }
 
 // The largest of a cell and its neighbours. The weather map repeats.

@@ -121,7 +121,7 @@ fn march_ray(direction: vec3f, offset: f32, within: vec2f) -> Cloud {
     // 6e-8 less.
     var optical_depth = 0.0;
     var transmittance = 1.0;
-    if length <= 0.0 || (!VOLUME && params.clouds.coverage <= 0.0) {
+    if length <= 0.0 || (!VOLUME && !UPPER && params.clouds.coverage <= 0.0) {
         return Cloud(vec3f(0.0), 1.0, -1.0, NOWHERE);
     }
     let steps = ray_steps(stretches.start, length, direction);

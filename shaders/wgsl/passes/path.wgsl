@@ -130,7 +130,7 @@ fn draw(ray: ptr<function, PathRay>, pixel: vec2u) -> vec3f {
 fn view_flight(view: vec4f) -> vec4f {
     let s = cloud_stretches(view.xyz);
     let room = max(quality.view_distance - s.start, 0.0);
-    let clear = view.w == 0.0 || (!VOLUME && params.clouds.coverage <= 0.0);
+    let clear = view.w == 0.0 || (!VOLUME && !UPPER && params.clouds.coverage <= 0.0);
     let first = min(s.first, room);
     let cut = vec4f(s.start, first, s.gap, min(s.second, room - first));
     return select(cut, vec4f(0.0), clear);

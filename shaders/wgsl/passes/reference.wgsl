@@ -43,7 +43,7 @@ fn reference(@builtin(global_invocation_id) id: vec3u) {
     let stretches = cloud_stretches(direction);
     let room = max(quality.view_distance - stretches.start, 0.0);
     let length = select(0.0, min(stretches.first + stretches.second, room), view.w > 0.0);
-    let empty = length <= 0.0 || (!VOLUME && params.clouds.coverage <= 0.0);
+    let empty = length <= 0.0 || (!VOLUME && !UPPER && params.clouds.coverage <= 0.0);
     let one_minus_mu = one_minus_cos(direction, frame.sun_direction);
     let sunlit = any(sky_light[2].rgb > vec3f(0.0));
     let opaque = dark_depth();

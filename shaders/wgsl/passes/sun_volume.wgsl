@@ -24,7 +24,7 @@ fn sun_volume_density(@builtin(global_invocation_id) id: vec3u) {
     for (var i = 0u; i < count; i++) {
         // A low-discrepancy sequence (R3) that begins in the middle.
         let at = corner + fract(0.5 + f32(i) * vec3f(0.8191725, 0.6710436, 0.5497004));
-        let altitude = mix(params.clouds.base, params.clouds.top, at.z / f32(ROWS));
+        let altitude = mix(frame.shell_base, frame.shell_top, at.z / f32(ROWS));
         density += cloud_density_cheap(vec3f(cell * at.xy, 0.0), altitude, min(cell, 100.0));
     }
     textureStore(volume_out, id, vec4f(density / f32(count)));
@@ -38,7 +38,7 @@ fn sun_volume_light(@builtin(global_invocation_id) id: vec3u) {
     let level = id.z / ROWS;
     let cell = level_cell(level);
     let xy = cell * (vec2f(id.xy) + 0.5 - 0.5 * f32(SIDE));
-    let altitude = mix(params.clouds.base, params.clouds.top, (f32(id.z % ROWS) + 0.5) / f32(ROWS));
+    let altitude = mix(frame.shell_base, frame.shell_top, (f32(id.z % ROWS) + 0.5) / f32(ROWS));
     let p = place(xy, altitude);
     let s = cloud_stretches_from(p, frame.sun_direction);
     let whole = s.start + s.first + s.gap + s.second;

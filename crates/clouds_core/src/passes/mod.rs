@@ -1,5 +1,6 @@
 //! One module for each pass, with the WGSL file of the same name: what it reads, what it makes, when it runs again.
 
+pub mod broad_weather;
 pub mod composite;
 pub mod high_clouds;
 pub mod majorant;
@@ -7,6 +8,7 @@ pub mod march;
 pub mod noise;
 pub mod path;
 pub mod points;
+pub mod profile;
 pub mod rays;
 pub mod reference;
 pub mod refine;

@@ -13,7 +13,7 @@ import numpy as np
 import twin
 
 FBM = np.array([0.625, 0.25, 0.125])
-SHAPE_SIZE, DETAIL_SIZE, CURL_SIZE, WEATHER_SIZE = 128, 32, 128, 512
+SHAPE_SIZE, DETAIL_SIZE, CURL_SIZE, WEATHER_SIZE, BROAD_SIZE = 128, 32, 128, 512, 128
 
 
 def f32(values):
@@ -172,6 +172,25 @@ def weather_texels(texels, weather):
     return np.stack([coverage, np.clip(kind, 0, 1), remap01(rain, 0.3, 0.7)], axis=-1)
 
 
+def broad_texels(texels, weather):
+    """What the larger map shifts coverage, type and precipitation by, and another noise: at most
+    half, nothing in the middle. From a map of the user's, whose fourth is 0.
+    """
+    texels = np.asarray(texels)
+    if weather.broad_map is not None:
+        own = half(f32(weather.broad_map[texels[..., 1], texels[..., 0]]) - 0.5)
+        return np.concatenate([own, np.zeros((*own.shape[:-1], 1))], axis=-1)
+    x, y = np.moveaxis(centres(texels, BROAD_SIZE), -1, 0)
+    seed = 97 * weather.seed + 131
+
+    def noise(p):
+        fbm = [perlin_fbm(p, 3 * (2 - i % 2), 2, seed + 8 * i) for i in range(4)]
+        return np.stack(fbm, axis=-1)
+
+    p = np.stack([x, 1 - y, np.full_like(x, 0.5)], axis=-1)
+    return (noise(p) - noise(np.full((1, 3), 0.5))).clip(-0.5, 0.5)
+
+
 def high_texels(texels, high, time):
     """gems2001: each octave fades from its last random update to its next, smaller ones sooner."""
     p = centres(texels, high.texture_size)
@@ -213,22 +232,44 @@ def smoothstep(a, b, v):
 
 
 def weather_from_map(texel, clouds):
-    """vsu2022: the parameters shift the map, 0.5 leaves it. nubis2015: rain brings coverage of 0.7
-    and cumulus, here in proportion and not to a clear sky. Coverage, type, precipitation.
+    """vsu2022: the parameters shift the map, 0.5 leaves it. nubis2015: rain brings coverage of at
+    least 0.7 and cumulus, here in proportion and not to a clear sky. Coverage, type, precipitation.
     """
     coverage, kind, rain = np.moveaxis(np.asarray(texel, dtype=np.float64), -1, 0)
     rain = rain * f32(clouds.precipitation)
     kind = np.clip(kind + 2 * (f32(clouds.type) - 0.5), 0, 1)
     coverage = np.clip(coverage + 2 * (f32(clouds.coverage) - 0.5), 0, 1)
-    coverage = np.maximum(coverage, 0.7 * rain * min(5 * f32(clouds.coverage), 1))
+    coverage = np.maximum(coverage, 0.95 * rain * min(5 * f32(clouds.coverage), 1))
     return coverage, kind + rain * (1 - kind), rain
 
 
-def height_profile(height, kind, constants):
-    """nubis2015: the sum of three gradients, weighted by type."""
-    weights = np.stack([1 - 2 * kind, 1 - np.abs(2 * kind - 1), 2 * kind - 1]).clip(0)
-    a, b, c, d = np.tensordot(constants.T, weights, 1)
+def gradients(clouds):
+    return [f32(getattr(clouds, t)) for t in ("stratus", "stratocumulus", "cumulus")]
+
+
+def between(height, a, b, c, d):
     return np.clip(twin.remap(height, a, b), 0, 1) * (1 - smoothstep(c, d, height))
+
+
+def height_profile(height, kind, clouds, tower=0.0):
+    """nubis2015: the sum of three gradients, weighted by type; or a table, by type from left to
+    right and by height from the last row to the first. Where a tower stands, its own.
+    """
+    storm = f32(clouds.cumulonimbus)
+    if clouds.profile is not None:
+        rows, columns = clouds.profile.shape
+        at = np.stack([kind * (columns - 1), (1 - np.clip(height, 0, 1)) * (rows - 1)], axis=-1)
+        at = (at + 0.5) / (columns, rows)
+
+        def texels(t):
+            # What repeats is not what is between the outer centres.
+            return half(clouds.profile[t[..., 1], t[..., 0]])[..., None]
+
+        dry = sample(texels, (columns, rows), at)[:, 0]
+        return dry + tower * (between(height, *storm) - dry)
+    weights = np.stack([1 - 2 * kind, 1 - np.abs(2 * kind - 1), 2 * kind - 1]).clip(0)
+    edges = np.tensordot(np.transpose(gradients(clouds)), weights, 1)
+    return between(height, *(edges + tower * (storm.reshape(4, *[1] * edges[0].ndim) - edges)))
 
 
 def base_shape(noise):
@@ -252,45 +293,144 @@ def bakes(params):
     """What is in each texture."""
     return {
         "weather_map": lambda texels: weather_texels(texels, params.weather),
+        "broad_map": lambda texels: broad_texels(texels, params.weather),
         "shape_noise": lambda texels: shape_texels(texels, params.clouds),
         "curl_noise": lambda texels: curl_texels(texels, params.clouds),
         "detail_noise": lambda texels: detail_texels(texels, params.clouds),
     }
 
 
-def extinction(points, params, time, gradients, textures):
-    """The whole sampler of nubis2015 at world points, in 1/m. `gradients`: the three of its height
-    profile; `textures`: texels to values, as `bakes` has them.
+class Field:
+    """The whole sampler of nubis2015 at world points at a time, with what has been added to it.
+
+    `textures`: texels to values, as `bakes` has them.
     """
-    clouds, weather, wind = params.clouds, params.weather, params.wind
-    altitude = twin.altitude(points, float(f32(params.atmosphere.planet_radius)))
-    height = (altitude - f32(clouds.base)) / (f32(clouds.top) - f32(clouds.base))
-    downwind, weather_wind = (
-        twin.compass(float(f32(degrees)))[:2]
-        for degrees in (wind.direction, wind.weather_direction)
-    )
-    upright = points[:, :2] - f32(wind.shear) * height[:, None] * downwind
 
-    def carried(at, speed):
+    def __init__(self, params, time, textures):
+        self.params, self.time, self.textures = params, time, textures
+
+    def extinction(self, points):
+        """In 1/m."""
+        clouds, deck = self.params.clouds, self.params.upper_clouds
+        altitude = twin.altitude(points, float(f32(self.params.atmosphere.planet_radius)))
+        limit, density = self.lower(points, altitude)
+        extinction = density * f32(clouds.extinction)
+        if clouds.rain_extinction > 0:
+            below = altitude < f32(clouds.base)
+            rain_limit, rain = self.rain(points, altitude)
+            limit = np.where(below, rain_limit, limit)
+            extinction = np.where(below, rain * f32(clouds.rain_extinction), extinction)
+        if deck.coverage > 0:
+            upper_limit, upper = self.upper(points, altitude)
+            extinction = np.where(upper_limit > limit, upper * f32(deck.extinction), extinction)
+        return extinction
+
+    def leant(self, points, altitude):
+        """Without the lean of the wind."""
+        clouds, wind = self.params.clouds, self.params.wind
+        height = (altitude - f32(clouds.base)) / (f32(clouds.top) - f32(clouds.base))
+        downwind = twin.compass(float(f32(wind.direction)))[:2]
+        return points[:, :2] - f32(wind.shear) * height[:, None] * downwind
+
+    def texel(self, on_map, points, drift):
+        """Of the weather map. Column 0 is the west, row 0 the north."""
+        weather = self.params.weather
+        down = np.array([1, -1])
+        at = 0.5 + on_map * down
+        size = WEATHER_SIZE if weather.map is None else weather.map.shape[1::-1]
+        if weather.broad_variety == 0 or (weather.map is not None and weather.broad_map is None):
+            return sample(self.textures["weather_map"], size, at)[:, :3]
+        own = weather.broad_map
+        broad_at = 0.5 + (points[:, :2] - drift) / f32(weather.broad_extent) * down
+        broad_size = BROAD_SIZE if own is None else own.shape[1::-1]
+        shift = sample(self.textures["broad_map"], broad_size, broad_at)
+        if own is None:
+            at = at + 0.5 * shift[:, [3, 1]]
+        texel = sample(self.textures["weather_map"], size, at)[:, :3]
+        return np.clip(texel + f32(weather.broad_variety) * shift[:, :3], 0, 1)
+
+    def weather(self, points, altitude):
+        """Where the weather is read, and what it says: coverage, type, precipitation."""
+        wind = self.params.wind
+        direction = twin.compass(float(f32(wind.weather_direction)))[:2]
+        drift = self.time * f32(wind.weather_speed) * direction
+        upright = self.leant(points, altitude)
+        on_map = (upright - drift) / f32(self.params.weather.extent)
+        return upright, weather_from_map(self.texel(on_map, points, drift), self.params.clouds)
+
+    def lower(self, points, altitude):
+        clouds = self.params.clouds
+        base, top = f32(clouds.base), f32(clouds.top)
+        upright, (coverage, kind, rain) = self.weather(points, altitude)
+        tallest = np.maximum(top, f32(clouds.cumulonimbus_top))
+        tower = smoothstep(0.5, 0.9, rain)
+        height = (altitude - base) / (top + tower * (tallest - top) - base)
+        profile = np.where(
+            (height > 0) & (height < 1), height_profile(height, kind, clouds, tower), 0
+        )
+        if clouds.precipitation > 0:
+            edge = 0.6 - 0.5 * f32(clouds.anvil)
+            anvil = smoothstep(edge, edge + 0.3, rain) * np.clip(2 * coverage, 0, 1)
+            anvil = anvil * between((altitude - base) / (tallest - base), 0.64, 0.8, 0.88, 1)
+            profile, coverage = np.maximum(profile, anvil), np.maximum(coverage, anvil)
+            height = np.minimum(height, 1)
+        wind = self.params.wind
+        speeds = f32(wind.speed), f32(wind.detail_speed)
+        density = self.cloud(
+            upright, altitude, height, profile, coverage, wind.direction, speeds, 1.0
+        )
+        return with_coverage(profile, coverage), density
+
+    def upper(self, points, altitude):
+        """The deck above: scaled, in a wind of its own, from another part of the map."""
+        deck, wind = self.params.upper_clouds, self.params.wind
+        base, scale = f32(deck.base), f32(deck.scale)
+        height = (altitude - base) / (f32(deck.top) - base)
+        downwind = twin.compass(float(f32(deck.direction)))[:2]
+        upright = points[:, :2] - f32(deck.shear) * height[:, None] * downwind
+        speed = f32(deck.speed)
+        extent = f32(self.params.weather.extent) * scale
+        on_map = (upright - self.time * speed * downwind) / extent + (0.37 - 0.5, 0.61 + 0.5)
+        direction = twin.compass(float(f32(wind.weather_direction)))[:2]
+        texel = self.texel(on_map, points, self.time * f32(wind.weather_speed) * direction)
+        coverage = np.clip(texel[:, 0] + 2 * f32(deck.coverage) - 1, 0, 1)
+        kind = np.clip(texel[:, 1] + 2 * f32(deck.type) - 1, 0, 1)
+        profile = np.where(
+            (height > 0) & (height < 1), height_profile(height, kind, self.params.clouds), 0
+        )
+        speeds = speed, speed + f32(wind.detail_speed) - f32(wind.speed)
+        density = self.cloud(
+            upright, altitude, height, profile, coverage, deck.direction, speeds, scale
+        )
+        return with_coverage(profile, coverage), density
+
+    def rain(self, points, altitude):
+        """Streaks, twelve times longer than wide, that thin out on their way down."""
+        clouds, wind = self.params.clouds, self.params.wind
+        upright, (coverage, _, rain) = self.weather(points, altitude)
+        share = altitude / f32(clouds.base)
+        limit = np.where(altitude > 0, np.clip(2 * rain * coverage - 0.6 + 0.6 * share, 0, 1), 0)
+        at = self.carried(upright, altitude / 12, wind.direction, f32(wind.speed))
+        noise = sample(self.textures["shape_noise"], SHAPE_SIZE, at / f32(clouds.shape_scale))
+        return limit, limit * np.clip(twin.remap(noise[:, 0], 0.1, 0.9), 0, 1)
+
+    def carried(self, at, altitude, direction, speed, scale=1.0):
         """Where the wind has brought here what was baked."""
-        at = at - time * f32(speed) * downwind
-        return np.column_stack([at, altitude - time * f32(wind.updraft)])
+        at = at - self.time * speed * twin.compass(float(f32(direction)))[:2]
+        rise = self.time * f32(self.params.wind.updraft)
+        return np.column_stack([at / scale, altitude / scale - rise / scale])
 
-    # Column 0 is the west, row 0 the north, and the origin of the world the middle of the map.
-    size = WEATHER_SIZE if weather.map is None else weather.map.shape[1::-1]
-    on_map = upright - time * f32(wind.weather_speed) * weather_wind
-    texel = sample(
-        textures["weather_map"], size, 0.5 + on_map / f32(weather.extent) * np.array([1, -1])
-    )
-    coverage, kind, _ = weather_from_map(texel[:, :3], clouds)
-    at = carried(upright, wind.speed) / f32(clouds.shape_scale)
-    noise = sample(textures["shape_noise"], SHAPE_SIZE, at)
-    shape = with_coverage(base_shape(noise) * height_profile(height, kind, gradients), coverage)
+    def cloud(self, upright, altitude, height, profile, coverage, direction, speeds, scale):
+        clouds = self.params.clouds
+        at = self.carried(upright, altitude, direction, speeds[0], scale) / f32(clouds.shape_scale)
+        noise = sample(self.textures["shape_noise"], SHAPE_SIZE, at)
+        shape = with_coverage(base_shape(noise) * profile, coverage)
+        shape = np.where(with_coverage(profile, coverage) > 0, shape, 0)
 
-    at = carried(upright, wind.detail_speed)[:, :2] / f32(clouds.curl_scale)
-    swirl = sample(textures["curl_noise"], CURL_SIZE, at)[:, :2]
-    swirled = upright + f32(clouds.curl) * (1 - height[:, None]) * swirl
-    at = carried(swirled, wind.detail_speed) / f32(clouds.detail_scale)
-    detail = sample(textures["detail_noise"], DETAIL_SIZE, at)[:, :3] @ FBM
-    density = eroded(shape, detail, height, f32(clouds.detail))
-    return np.where((height > 0) & (height < 1), density, 0) * f32(clouds.extinction)
+        moved = self.carried(upright, altitude, direction, speeds[1], scale)
+        at = moved[:, :2] / f32(clouds.curl_scale)
+        swirl = sample(self.textures["curl_noise"], CURL_SIZE, at)[:, :2]
+        moved[:, :2] += f32(clouds.curl) * (1 - height[:, None]) * swirl
+        at = moved / f32(clouds.detail_scale)
+        detail = sample(self.textures["detail_noise"], DETAIL_SIZE, at)[:, :3] @ FBM
+        return eroded(shape, detail, height, f32(clouds.detail))

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 import nubis
 import twin
 from nubis import Camera, ParameterError, Params, Quality
-from test_params import CLASSES, allowed, filled, kind
+from test_params import CLASSES, IMAGES, allowed, filled, kind
 
 AIR_TOP = 100_000.0  # m, as in frame.rs
 FARTHEST = 2e8  # m: no eye may be farther from the origin in any coordinate
@@ -44,14 +44,16 @@ COSTLY = {
 
 
 @st.composite
-def weather_maps(draw):
+def images(draw, channels):
     """All empty, all full, one texel, steps, noise."""
     size = draw(st.sampled_from([(1, 1), (1, 2), (2, 1), (3, 5), (8, 8)]))
     values = st.sampled_from([0.0, 1.0, 0.5, 1e-7, math.nextafter(1, 0)])
     if draw(st.booleans()):
-        return np.full((*size, 3), draw(st.tuples(values, values, values)), dtype=np.float32)
-    steps = draw(st.lists(values, min_size=3 * math.prod(size), max_size=3 * math.prod(size)))
-    return np.array(steps, dtype=np.float32).reshape(*size, 3)
+        image = np.full((*size, 3), draw(st.tuples(values, values, values)), dtype=np.float32)
+    else:
+        steps = draw(st.lists(values, min_size=3 * math.prod(size), max_size=3 * math.prod(size)))
+        image = np.array(steps, dtype=np.float32).reshape(*size, 3)
+    return image if channels == 3 else image[..., 0]
 
 
 # Made once: making strategies takes longer than rendering their examples.
@@ -65,8 +67,8 @@ def field(group, name):
         return st.sampled_from(typing.get_args(hint))
     if hint is bool:
         return st.booleans()
-    if name == "map":
-        return st.one_of(st.none(), weather_maps())
+    if (group, name) in IMAGES:
+        return st.one_of(st.none(), images(3 if IMAGES[group, name].ndim == 3 else 1))
     low, high = allowed(group, name)[1]
     if hint is int:
         return whole_numbers(int(low), int(high))
@@ -114,6 +116,19 @@ def params(draw, fields=tuple(FIELDS), **fixed):
         thin = float(np.nextafter(np.float32(base), np.float32(np.inf)))
         values["clouds.base"] = base
         values["clouds.top"] = draw(st.sampled_from([max(thin, 1.0), base + 1.0]))
+    for name in ("stratus", "stratocumulus", "cumulus", "cumulonimbus"):
+        if f"clouds.{name}" in values:
+            values[f"clouds.{name}"] = tuple(sorted(values[f"clouds.{name}"]))
+    deck = Params().upper_clouds
+    base, top = (values.get(f"upper_clouds.{n}", getattr(deck, n)) for n in ("base", "top"))
+    lower = values.get("clouds.top", Params().clouds.top)
+    if values.get("upper_clouds.coverage", 0.0) > 0 and base < lower:
+        values["upper_clouds.base"] = base = lower
+    if np.float32(top) <= np.float32(base):
+        values["upper_clouds.base"] = base = min(base, 24_999.0)
+        values["upper_clouds.top"] = base + 1.0
+        if base < lower:
+            values["upper_clouds.coverage"] = 0.0
     sky = Params().with_(**values)
     if hasattr(nubis, "DensityGrid") and draw(st.integers(0, 3)) == 0:
         sky = sky.replace(volume=draw(grids()))
@@ -122,7 +137,9 @@ def params(draw, fields=tuple(FIELDS), **fixed):
 
 def shells(sky):
     """Altitudes where something begins or ends."""
-    return [0.0, sky.clouds.base, sky.clouds.top, sky.high_clouds.altitude, AIR_TOP]
+    clouds, deck = sky.clouds, sky.upper_clouds
+    volumetric = [clouds.base, clouds.top, clouds.cumulonimbus_top, deck.base, deck.top]
+    return [0.0, *volumetric, sky.high_clouds.altitude, AIR_TOP]
 
 
 @st.composite

@@ -9,7 +9,7 @@ import pytest
 
 import nubis
 import twin
-from noise_twin import FBM, base_shape, eroded, height_profile, with_coverage
+from noise_twin import FBM, base_shape, eroded, gradients, height_profile, with_coverage
 from nubis.testing import probe
 
 UNIT = np.linspace(0, 1, 11)
@@ -19,25 +19,24 @@ def grid(*axes):
     return np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, len(axes))
 
 
-def profile_constants():
-    """The three published gradients are tuned; only how they are used is fixed."""
-    names = ["STRATUS", "STRATOCUMULUS", "CUMULUS"]
-    return np.array(
-        [probe(name, [0.0], imports=["density"])[0] for name in names], dtype=np.float64
-    )
-
-
-def test_height_profile():
-    constants = profile_constants()
-    inputs = grid(np.linspace(-0.1, 1.1, 61), UNIT)
-    got = probe("height_profile(x.x, x.y)", inputs, imports=["density"])[:, 0]
-    np.testing.assert_allclose(got, height_profile(*inputs.T, constants), atol=2e-4)
-    for kind, (a, b, c, d) in zip((0, 0.5, 1), constants, strict=True):
-        assert 0 <= a < b <= c < d <= 1
+@pytest.mark.parametrize(
+    "edges",
+    [{}, {"clouds.stratus": (0.0, 0.3, 0.3, 0.4), "clouds.cumulus": (0.2, 0.5, 0.6, 0.9)}],
+)
+def test_height_profile(edges):
+    """By the published gradients, and by others (vsu2022: three of the user's)."""
+    params = nubis.Params().with_(**{"clouds.precipitation": 1.0, **edges})
+    inputs = grid(np.linspace(-0.1, 1.1, 61), UNIT, [0.0, 0.3, 1.0])
+    profile = "height_profile(x.x, x.y, x.z)"
+    got = probe(profile, inputs, imports=["density"], params=params)[:, 0]
+    height, kind, tower = inputs.T
+    np.testing.assert_allclose(got, height_profile(height, kind, params.clouds, tower), atol=2e-4)
+    for kind, (a, b, c, d) in zip((0, 0.5, 1), gradients(params.clouds), strict=True):
         ends = probe(
-            "height_profile(x.x, x.y)",
-            [(a, kind), (0.5 * (b + c), kind), (d, kind)],
+            profile,
+            [(a, kind, 0), (0.5 * (b + c), kind, 0), (d, kind, 0)],
             imports=["density"],
+            params=params,
         )
         np.testing.assert_allclose(ends[:, 0], [0, 1, 0], atol=1e-5)
 
@@ -154,7 +153,7 @@ def test_density_is_the_published_sampler(renderer, rng, time):
     swirled = at + c.curl * (1 - height[:, None]) * swirl
     detail = read("detail_noise", moved(swirled, w.detail_speed) / c.detail_scale)[:, :3] @ FBM
 
-    profile = height_profile(height, np.full(len(height), 0.6), profile_constants())
+    profile = height_profile(height, np.full(len(height), 0.6), c)
     shape = with_coverage(base_shape(noise) * profile, 0.8)
     expected = eroded(shape, detail, height, c.detail) * c.extinction
     got = renderer().density(points, params, time=time)
@@ -282,6 +281,7 @@ def test_long_times_lose_nothing(renderer, periods):
             "clouds.detail_scale": 500.0,
             "clouds.curl_scale": 2500.0,
             "weather.extent": 50_000.0,
+            "weather.broad_extent": 400_000.0,
             "high_clouds.scale": 50_000.0,
             "high_clouds.direction": 0.0,
             "high_clouds.speed": 10.0,
@@ -289,7 +289,8 @@ def test_long_times_lose_nothing(renderer, periods):
         },
     )
     camera = nubis.Camera.look_at((0, 0, 100), (0, 1000, 400))
-    # 800 km: a whole number of tiles of each, also of the high clouds' second, 3.2 times as wide.
+    # 800 km: a whole number of tiles of each, also of the second map of the weather and of that of
+    # the high clouds, 3.2 times as wide.
     period = 80_000.0
     first, later, between = (
         renderer().render(camera, params, time=t) for t in (0, periods * period, 0.5 * period)

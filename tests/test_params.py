@@ -154,6 +154,12 @@ def test_floats_keep_their_digits():
 
 
 MAP = np.linspace(0, 1, 2 * 3 * 3).reshape(2, 3, 3)
+#: The parameters that are images: of three channels, or of one.
+IMAGES = {
+    ("weather", "map"): MAP,
+    ("weather", "broad_map"): MAP,
+    ("clouds", "profile"): MAP[..., 0],
+}
 
 
 def test_a_map_is_a_copy():
@@ -205,6 +211,35 @@ def test_a_map_is_read_only(clone):
 )
 def test_maps_that_are_none(bad):
     refused("weather", "map", bad)
+    if not isinstance(bad, np.ndarray):
+        refused("clouds", "profile", bad)
+    elif bad.shape[2:] == (3,):
+        refused("clouds", "profile", bad[..., 0])
+
+
+def test_images_have_their_channels():
+    for (group, name), image in IMAGES.items():
+        np.testing.assert_array_equal(getattr(make(group, name, image), name), np.float32(image))
+    refused("clouds", "profile", MAP)
+    refused("weather", "broad_map", MAP[..., 0])
+
+
+@pytest.mark.parametrize(
+    "edges", [(0.2, 0.1, 0.3, 0.4), (0.0, 0.5, 0.4, 1.0), (0.0, 0.1, 0.9, 0.8)]
+)
+@pytest.mark.parametrize("name", ["stratus", "stratocumulus", "cumulus", "cumulonimbus"])
+def test_profiles_rise_before_they_fall(name, edges):
+    with pytest.raises(nubis.ParameterError, match=rf"^clouds\.{name} = .*rising order"):
+        Params().with_(**{f"clouds.{name}": edges})
+
+
+def test_decks_that_do_not_stand_above_one_another():
+    with pytest.raises(nubis.ParameterError, match=r"^upper_clouds\.top = 4000 .*4800 m"):
+        Params().with_(**{"upper_clouds.top": 4000.0})
+    below = {"upper_clouds.base": 3000.0, "upper_clouds.top": 4000.0}
+    Params().with_(**below)
+    with pytest.raises(nubis.ParameterError, match=r"^upper_clouds\.base = 3000 .*3200 m"):
+        Params().with_(**below, **{"upper_clouds.coverage": 0.1})
 
 
 def test_frozen_and_keyword_only():
@@ -229,8 +264,8 @@ def test_equality_sees_every_field(group, name):
         other = next(word for word in typing.get_args(hint) if word != default)
     elif hint is bool:
         other = not default
-    elif name == "map":
-        other = MAP
+    elif (group, name) in IMAGES:
+        other = IMAGES[group, name]
     else:
         low, high = allowed(group, name)[1]
         # Near the default, so that no pair of fields is at odds.
@@ -268,6 +303,8 @@ def rich_params():
     return Params().with_(
         **{
             "weather.map": MAP,
+            "weather.broad_map": MAP[::-1],
+            "clouds.profile": MAP[..., 1],
             "clouds.seed": 4294967295,
             "clouds.coverage": 0.123456789,
             "clouds.extinction": 1e-7,
@@ -288,7 +325,7 @@ class TestCopies:
 
     def test_repr(self, params):
         """It is Python that makes the same again, but for an array's digits."""
-        plain = params.with_(**{"weather.map": None})
+        plain = params.with_(**{f"{group}.{name}": None for group, name in IMAGES})
         assert eval(repr(plain), vars(nubis)) == plain
 
     def test_dict(self, params):

@@ -19,7 +19,7 @@ import strategies
 import twin
 from nubis import Camera, ParameterError, Params
 from strategies import DRAFT
-from test_params import CLASSES, allowed, filled, kind
+from test_params import CLASSES, IMAGES, allowed, filled, kind
 
 EXAMPLES = int(os.environ.get("EXAMPLES", 700))
 SEED = os.environ.get("SEED")
@@ -189,6 +189,7 @@ def test_the_wind_comes_round(data, turns, exponent):
             "wind.weather_direction": 0.0,
             "wind.updraft": data.draw(st.sampled_from([0.0, 1.0, -2.0, 0.125])),
             "weather.extent": 4 * period,
+            "weather.broad_extent": 4 * period,
             "clouds.shape_scale": period,
             "clouds.detail_scale": period / 16,
             "clouds.curl_scale": period / 4,
@@ -248,7 +249,8 @@ def test_a_little_change_changes_little(data):
 
     - g to 0.999: at 0.9999 the forward peak itself changes by 3 % with a millionth of g;
     - shells and grids of 100 m at least that lean by at most ten times their thickness: in one that
-      leans by 20 km a metre, a millimetre moves 20 m;
+      leans by 20 km a metre, a millimetre moves 20 m; the upper deck likewise, and not made a
+      hundred times smaller;
     - twists of at most a tenth of their size: where 100 m of twist change every 10 m, a millimetre
       moves 60 mm of detail;
     - planets to 10 000 km: around one of a million kilometres a level ray that turns by a
@@ -259,13 +261,21 @@ def test_a_little_change_changes_little(data):
     if params.volume is not None:
         assume(np.subtract(*params.volume.bounds[::-1]).min() >= 100)
     light, clouds = params.light, params.clouds
-    thickness = max(clouds.top - clouds.base, 100.0)
+    thickness = np.clip(clouds.top - clouds.base, 100.0, 10_000.0)
+    base = min(clouds.base, 25_000 - 2 * thickness)
     lean = min(abs(params.wind.shear), 10 * thickness)
     params = params.with_(
         **{
             "light.g": min(max(light.g, -0.999), 0.999),
             "light.g_back": min(max(light.g_back, -0.999), 0.999),
-            "clouds.top": clouds.base + thickness,
+            "clouds.top": base + thickness,
+            "clouds.base": base,
+            "upper_clouds.base": base + thickness,
+            "upper_clouds.top": base + 2 * thickness,
+            "upper_clouds.scale": max(params.upper_clouds.scale, 0.3),
+            "upper_clouds.shear": math.copysign(
+                min(abs(params.upper_clouds.shear), 10 * thickness), params.upper_clouds.shear
+            ),
             "atmosphere.planet_radius": min(params.atmosphere.planet_radius, 1e7),
             "clouds.curl": min(clouds.curl, 0.1 * clouds.curl_scale),
             "wind.shear": math.copysign(lean, params.wind.shear),
@@ -541,7 +551,7 @@ def test_wrong_values_of_parameters(field, data):
         value = data.draw(st.one_of(st.just(value), beyond))
         if filled(hint, 0) != 0 and data.draw(st.booleans()):
             value = (low, high, value)
-    elif (hint is bool and value is True) or (name == "map" and value is None):
+    elif (hint is bool and value is True) or ((group, name) in IMAGES and value is None):
         return
     with pytest.raises(ParameterError):
         CLASSES[group](**{name: value})

@@ -75,12 +75,13 @@ def test_methods_converge_to_the_reference(renderer, model):
     assert (want["change"] <= 1.1e-3 * (want["radiance"] + 1e-6 * 3)).mean() > 0.9
 
 
-@pytest.mark.parametrize("scene", ["fair_weather", "storm"])
-def test_majorants_are_never_exceeded(rng, scene):
+@pytest.mark.parametrize(("scene", "clear"), [("fair_weather", 0.1), ("storm", 0.005)])
+def test_majorants_are_never_exceeded(rng, scene, clear):
     """Not at the point, and nowhere within their reach."""
     params = nubis.scenes[scene][1].with_(**{"light.model": "path"})
     clouds = params.clouds
-    low, high = [-20_000, -20_000, clouds.base], [20_000, 20_000, clouds.top]
+    top = clouds.cumulonimbus_top if clouds.precipitation > 0 else clouds.top
+    low, high = [-20_000, -20_000, clouds.base], [20_000, 20_000, top]
 
     def ask(expression, points):
         inputs = np.hstack([points, np.zeros((len(points), 1))])
@@ -98,12 +99,12 @@ def test_majorants_are_never_exceeded(rng, scene):
     way = twin.normalized(rng.normal(size=points.shape))
     start = points + way * reach * rng.uniform(0, 0.999, (len(points), 1))
     bound = ask(f"vec4f({near}.density)", start)[:, 0]
-    inside = (start[:, 2] > clouds.base + 50) & (start[:, 2] < clouds.top - 50)
+    inside = (start[:, 2] > clouds.base + 50) & (start[:, 2] < top - 50)
     # Rounding of positions apart, which are kilometres from the eye.
     assert (density <= bound + 1e-4)[inside].all()
     # Local: where there is no cloud for kilometres they say so.
     anywhere = ask(f"vec4f({near}.density)", rng.uniform(low, high, (4000, 3)))[:, 0]
-    assert (anywhere == 0).mean() > 0.02
+    assert (anywhere == 0).mean() > clear
 
 
 def test_majorants_of_a_grid(rng):

@@ -66,12 +66,20 @@ def pixel_directions(camera, width, height):
     return normalized(x[..., None] * right + y[..., None] * up + forward)
 
 
+def shell(params):
+    """The lowest and the highest altitude at which there can be anything."""
+    clouds, deck = params.clouds, params.upper_clouds
+    top = max(clouds.top, clouds.cumulonimbus_top if clouds.precipitation > 0.2 else 0.0)
+    lowest = 0.0 if clouds.rain_extinction > 0 else clouds.base
+    return lowest, max(top, deck.top if deck.coverage > 0 else 0.0)
+
+
 def ray_ends(eye, directions, params):
     """How far along each ray there can be cloud: to the ground, or to where the ray leaves the
     shell for good.
     """
     radius = params.atmosphere.planet_radius
-    end = np.nan_to_num(sphere_hits(eye, directions, radius, params.clouds.top)[1]).clip(0)
+    end = np.nan_to_num(sphere_hits(eye, directions, radius, shell(params)[1])[1]).clip(0)
     ground = sphere_hits(eye, directions, radius, 0.0)[0]
     return np.where(ground > 0, np.minimum(end, ground), end)
 
@@ -113,7 +121,7 @@ def sun_transmittance(renderer, params, points, n, time=0.0):
     sun, radius = sun_direction(params), params.atmosphere.planet_radius
     # To the last way out of the shell; without one in front, there is nothing between the point and
     # the sun.
-    ends = np.nan_to_num(sphere_hits(points, sun, radius, params.clouds.top)[1]).clip(0)
+    ends = np.nan_to_num(sphere_hits(points, sun, radius, shell(params)[1])[1]).clip(0)
     depth = optical_depths(
         renderer, params, points, np.broadcast_to(sun, points.shape), ends, n, time
     )[0]

@@ -7,9 +7,8 @@
 const LEVELS = 6u;
 // The side of a cell of the finest level, m.
 const CELL = 75.0;
-// Cells across a level, and between base and top.
+// Cells across a level; between base and top they are `frame.sun_volume_rows`.
 const SIDE = 96u;
-const ROWS = 24u;
 // Deep clouds pass no light that half floats hold, yet models that scatter many times see their depth: the texels hold
 // exp(-rate * depth) for four rates.
 const RATES = vec4f(1.0, 0.25, 0.0625, 0.015625);
@@ -28,9 +27,10 @@ fn level_at(p: vec2f) -> u32 {
 
 // Where a place is in the stack; z keeps half a cell from the levels above and below.
 fn stack_coordinates(p: vec2f, height: f32, level: u32) -> vec3f {
+    let rows = frame.sun_volume_rows;
     let across = (p + frame.sun_volume_eye) / (level_cell(level) * f32(SIDE)) + 0.5;
-    let row = clamp(height * f32(ROWS), 0.5, f32(ROWS) - 0.5) + f32(level * ROWS);
-    return vec3f(across, row / f32(LEVELS * ROWS));
+    let row = clamp(height * f32(rows), 0.5, f32(rows) - 0.5) + f32(level * rows);
+    return vec3f(across, row / f32(LEVELS * rows));
 }
 
 fn height_at(altitude: f32) -> f32 {

@@ -130,6 +130,8 @@ params! {
 
         /// Where the eye is in the sun volume, after the wind, m from its middle (sun_volume.wgsl).
         sun_volume_eye: [f32; 2] = [0.0; 2];
+        /// Cells of that between the lowest and the highest clouds.
+        sun_volume_rows: u32 = 1;
 
         /// Unit vector toward the sun.
         sun_direction: [f32; 3] = [0.0, 0.0, 1.0];
@@ -227,6 +229,7 @@ impl Frame {
         frame.set_planet(camera.eye, params);
         frame.set_wind(camera.eye, params, time);
         frame.set_volume(camera.eye, params);
+        frame.sun_volume_rows = sun_volume::rows(params);
         frame.sun_volume_eye = sun_volume::eye_in(camera.eye, params, time);
         frame.high_clouds = u32::from(params.high_clouds.coverage > 0.0);
         frame.sun_direction = sun_direction(params).as_vec3().to_array();

@@ -14,7 +14,8 @@ fn broad_weather(@builtin(global_invocation_id) id: vec3u) {
     }
     // As in passes/weather. The middle, where the origin of the world is, keeps the weather of the smaller map.
     let p = vec3f((f32(id.x) + 0.5) / f32(size.x), 1.0 - (f32(id.y) + 0.5) / f32(size.y), 0.5);
-    textureStore(map_out, id.xy, broad_noise(p) - broad_noise(vec3f(0.5)));
+    let shift = broad_noise(p) - broad_noise(vec3f(0.5));
+    textureStore(map_out, id.xy, clamp(shift, vec4f(-0.5), vec4f(0.5)));
 }
 
 fn broad_noise(p: vec3f) -> vec4f {

@@ -45,9 +45,9 @@ fn majorant_weather(@builtin(global_invocation_id) id: vec3u) {
         }
     }
     if BROAD_WEATHER {
-        // It shifts each by at most as much.
-        most = saturate(most + params.weather.broad_variety);
-        least = saturate(least - params.weather.broad_variety);
+        // It shifts each by at most half of that.
+        most = saturate(most + 0.5 * params.weather.broad_variety);
+        least = saturate(least - 0.5 * params.weather.broad_variety);
     }
     let wettest = weather_from_map(most);
     let driest = weather_from_map(least);

@@ -7,24 +7,27 @@
 
 // Points that a cell's density is the mean of, beyond the finest level.
 const POINTS = 4u;
-// Samples toward the sun for each doubling of the distance, and most of them.
-const DENSE_SAMPLES = 3.0;
-const MOST_SAMPLES = 40.0;
+// Samples toward the sun for each doubling of the distance, and most of them. They read cells as long as they are, or by so
+// many halvings shorter. Storms cast shadows over tens of kilometres: there, more and shorter ones take the mean error of the
+// transmittance in the scene `storm` from 0.11 to 0.05.
+override DENSE_SAMPLES: f32 = select(4.0, 6.0, RAINY);
+override MOST_SAMPLES: f32 = select(50.0, 70.0, RAINY);
+override SHORTER: f32 = select(0.5, 1.0, RAINY);
 
 @compute @workgroup_size(8, 8)
 fn sun_volume_density(@builtin(global_invocation_id) id: vec3u) {
-    if any(id >= vec3u(SIDE, SIDE, LEVELS * ROWS)) {
+    if any(id >= vec3u(SIDE, SIDE, LEVELS * frame.sun_volume_rows)) {
         return;
     }
-    let level = id.z / ROWS;
+    let level = id.z / frame.sun_volume_rows;
     let cell = level_cell(level);
-    let corner = vec3f(vec2f(id.xy) - 0.5 * f32(SIDE), f32(id.z % ROWS));
+    let corner = vec3f(vec2f(id.xy) - 0.5 * f32(SIDE), f32(id.z % frame.sun_volume_rows));
     let count = select(POINTS, 1u, level == 0u);
     var density = 0.0;
     for (var i = 0u; i < count; i++) {
         // A low-discrepancy sequence (R3) that begins in the middle.
         let at = corner + fract(0.5 + f32(i) * vec3f(0.8191725, 0.6710436, 0.5497004));
-        let altitude = mix(frame.shell_base, frame.shell_top, at.z / f32(ROWS));
+        let altitude = mix(frame.shell_base, frame.shell_top, at.z / f32(frame.sun_volume_rows));
         density += cloud_density_cheap(vec3f(cell * at.xy, 0.0), altitude, min(cell, 100.0));
     }
     textureStore(volume_out, id, vec4f(density / f32(count)));
@@ -32,13 +35,13 @@ fn sun_volume_density(@builtin(global_invocation_id) id: vec3u) {
 
 @compute @workgroup_size(8, 8)
 fn sun_volume_light(@builtin(global_invocation_id) id: vec3u) {
-    if any(id >= vec3u(SIDE, SIDE, LEVELS * ROWS)) {
+    if any(id >= vec3u(SIDE, SIDE, LEVELS * frame.sun_volume_rows)) {
         return;
     }
-    let level = id.z / ROWS;
+    let level = id.z / frame.sun_volume_rows;
     let cell = level_cell(level);
     let xy = cell * (vec2f(id.xy) + 0.5 - 0.5 * f32(SIDE));
-    let altitude = mix(frame.shell_base, frame.shell_top, (f32(id.z % ROWS) + 0.5) / f32(ROWS));
+    let altitude = mix(frame.shell_base, frame.shell_top, (f32(id.z % frame.sun_volume_rows) + 0.5) / f32(frame.sun_volume_rows));
     let p = place(xy, altitude);
     let s = cloud_stretches_from(p, frame.sun_direction);
     let whole = s.start + s.first + s.gap + s.second;
@@ -51,7 +54,7 @@ fn sun_volume_light(@builtin(global_invocation_id) id: vec3u) {
         let end = cell * (exp2(rate * i) - 1.0);
         let at = p + 0.5 * (begin + end) * frame.sun_direction;
         let height = height_at(altitude_at(at));
-        let coarse = u32(clamp(log2((end - begin) / CELL), f32(level), f32(LEVELS - 1u)));
+        let coarse = u32(clamp(log2((end - begin) / CELL) - SHORTER, f32(level), f32(LEVELS - 1u)));
         let coordinates = stack_coordinates(at.xy, height, max(coarse, level_at(at.xy)));
         let density = textureSampleLevel(volume_in, clamp_sampler, coordinates, 0.0).r;
         let inside = height >= 0.0 && height <= 1.0;

@@ -8,13 +8,14 @@ use crate::params::{self, Model, Params};
 
 /// Voxels along the side of a cell (as in majorant.wgsl).
 const BRICK: usize = 4;
-/// Most cells along a side of the weather map, and cells between base and top.
-const CELLS: [u32; 2] = [64, 16];
+/// Most cells along a side of the weather map, and their height between the lowest and the highest clouds, m.
+const CELLS: u32 = 64;
+const CELL_HEIGHT: f32 = 125.0;
 /// Texels of the weather map's side for each cell.
 const TEXELS: u32 = 8;
 
 /// What the majorants are made from: the grid by its address, or weather and cover.
-type Key = (bool, usize, params::Weather, params::Clouds);
+type Key = (bool, usize, params::Weather, params::Clouds, params::UpperClouds);
 
 /// The majorants on the GPU.
 pub(crate) struct Majorants {
@@ -30,14 +31,16 @@ impl Majorants {
     pub fn run(&mut self, ctx: &mut Context<'_>, params: &Params, world: &Bindings<'_>) -> Result<Bindings<'_>> {
         let wanted = ctx.variant.model == Model::Path;
         let grid = params.volume.as_ref().map_or(0, |grid| Arc::as_ptr(grid) as usize);
-        let key = (wanted, grid, params.weather.clone(), params.clouds.clone());
+        let key = (wanted, grid, params.weather.clone(), params.clouds.clone(), params.upper_clouds.clone());
         let view = self.made.get(key, || {
             let (entry, size) = match &params.volume {
                 _ if !wanted => ("", [1; 3]),
                 Some(grid) => ("majorant_grid", grid.size().map(|n| n.div_ceil(BRICK) as u32)),
                 None => {
-                    let across = weather::size(&params.weather).map(|n| n.div_ceil(TEXELS).clamp(1, CELLS[0]));
-                    ("majorant_weather", [across[0], across[1], CELLS[1]])
+                    let across = weather::size(&params.weather).map(|n| n.div_ceil(TEXELS).clamp(1, CELLS));
+                    let [base, top] = params.shell();
+                    let up = (((top - base) / CELL_HEIGHT) as u32).clamp(16, 64);
+                    ("majorant_weather", [across[0], across[1], up])
                 }
             };
             let [bounds, dilated] = ["bounds", "majorants"].map(|label| ctx.gpu.texture_3d(label, size));

@@ -8,14 +8,18 @@ use crate::error::Result;
 use crate::frame::{Frame, drift};
 use crate::params::{self, Params};
 
-/// Cells of a level, and levels (as in sun_volume.wgsl).
-const SIZE: [u32; 3] = [96, 96, 6 * 24];
+/// Cells across a level, and levels (as in sun_volume.wgsl).
+const SIDE: u32 = 96;
+const LEVELS: u32 = 6;
+/// Height of a cell, m, and how many there may be of them: clouds are no flatter than that, and storms no dearer.
+const CELL_HEIGHT: f32 = 85.0;
+const ROWS: [u32; 2] = [24, 72];
 /// The eye and the clouds may move so far while the volume stays, m: a sixth of the finest level, a third of its cell.
 const EYE_STEP: f64 = 600.0;
 const CLOUD_STEP: f64 = 25.0;
 
 /// What the light is made from: whether it is wanted, sun, clouds, weather, wind and planet, and from where and when.
-type Key = (bool, [f32; 2], params::Clouds, params::Weather, params::Wind, f32, [i64; 3]);
+type Key = (bool, [f32; 2], params::Clouds, params::UpperClouds, params::Weather, params::Wind, f32, [i64; 3]);
 
 /// The levels on the GPU.
 pub(crate) struct SunVolume {
@@ -32,7 +36,7 @@ struct Origin {
 impl Origin {
     fn new(eye: DVec3, params: &Params, time: f64) -> Self {
         let wind = &params.wind;
-        let fastest = [wind.speed, wind.weather_speed, wind.updraft].map(f32::abs).into_iter().fold(0.1, f32::max);
+        let fastest = [wind.speed, wind.weather_speed, wind.updraft, params.upper_clouds.speed].map(f32::abs).into_iter().fold(0.1, f32::max);
         let period = CLOUD_STEP / f64::from(fastest);
         let place = (eye.truncate() / EYE_STEP).round();
         let steps = [place.x as i64, place.y as i64, (time / period).floor() as i64];
@@ -44,6 +48,12 @@ impl Origin {
 pub(crate) fn eye_in(eye: DVec3, params: &Params, time: f64) -> [f32; 2] {
     let origin = Origin::new(eye, params, time);
     (eye.truncate() - origin.place - drift(params, time - origin.time).truncate()).as_vec2().to_array()
+}
+
+/// Cells between the lowest and the highest clouds.
+pub(crate) fn rows(params: &Params) -> u32 {
+    let [base, top] = params.shell();
+    (((top - base) / CELL_HEIGHT) as u32).clamp(ROWS[0], ROWS[1])
 }
 
 impl SunVolume {
@@ -64,24 +74,26 @@ impl SunVolume {
         let origin = Origin::new(eye, params, time);
         let sun = [params.sun.elevation, params.sun.azimuth];
         let radius = params.atmosphere.planet_radius;
-        let (clouds, weather, wind) = (params.clouds.clone(), params.weather.clone(), params.wind.clone());
-        let key = (wanted, sun, clouds, weather, wind, radius, origin.steps);
+        let (clouds, upper) = (params.clouds.clone(), params.upper_clouds.clone());
+        let (weather, wind) = (params.weather.clone(), params.wind.clone());
+        let key = (wanted, sun, clouds, upper, weather, wind, radius, origin.steps);
         let view = self.made.get(key, || {
             let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
             if !wanted {
                 return Ok(view(&ctx.gpu.texture_3d("sun_volume", [1; 3])));
             }
-            let density = view(&ctx.gpu.texture_3d("sun_volume_density", SIZE));
-            let light = view(&ctx.gpu.texture_3d("sun_volume", SIZE));
+            let size = [SIDE, SIDE, LEVELS * frame.sun_volume_rows];
+            let density = view(&ctx.gpu.texture_3d("sun_volume_density", size));
+            let light = view(&ctx.gpu.texture_3d("sun_volume", size));
             let camera = Camera::equirect(origin.place.extend(0.0))?;
             let there = Frame::new(&camera, params, origin.time, [1, 1]);
             ctx.uniforms.upload_frame(ctx.gpu, &Frame { sun_volume_eye: [0.0; 2], ..there });
             let mut work = ctx.gpu.work();
             let bindings = [world.as_slice(), &[("volume_out", (&density).into())]].concat();
-            work.dispatch(&*ctx.gpu.kernel("sun_volume", "sun_volume_density", ctx.variant)?, &bindings, SIZE)?;
+            work.dispatch(&*ctx.gpu.kernel("sun_volume", "sun_volume_density", ctx.variant)?, &bindings, size)?;
             let ours = [("volume_in", (&density).into()), ("volume_out", (&light).into())];
             let bindings = [world.as_slice(), &ours].concat();
-            work.dispatch(&*ctx.gpu.kernel("sun_volume", "sun_volume_light", ctx.variant)?, &bindings, SIZE)?;
+            work.dispatch(&*ctx.gpu.kernel("sun_volume", "sun_volume_light", ctx.variant)?, &bindings, size)?;
             work.submit(ctx.timings, ctx.interrupt)?;
             ctx.uniforms.upload_frame(ctx.gpu, frame);
             Ok(light)

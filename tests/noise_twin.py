@@ -370,7 +370,7 @@ class Field:
         )
         if clouds.precipitation > 0:
             edge = 0.6 - 0.5 * f32(clouds.anvil)
-            anvil = smoothstep(edge, edge + 0.3, rain) * np.clip(2 * coverage, 0, 1)
+            anvil = smoothstep(edge, edge + 0.3, rain) * np.clip(4 * coverage, 0, 1)
             anvil = anvil * between((altitude - base) / (tallest - base), 0.64, 0.8, 0.88, 1)
             profile, coverage = np.maximum(profile, anvil), np.maximum(coverage, anvil)
             height = np.minimum(height, 1)
@@ -412,7 +412,7 @@ class Field:
         limit = np.where(altitude > 0, np.clip(2 * rain * coverage - 0.6 + 0.6 * share, 0, 1), 0)
         at = self.carried(upright, altitude / 12, wind.direction, f32(wind.speed))
         noise = sample(self.textures["shape_noise"], SHAPE_SIZE, at / f32(clouds.shape_scale))
-        return limit, limit * np.clip(twin.remap(noise[:, 0], 0.1, 0.9), 0, 1)
+        return limit, limit * np.clip(twin.remap(base_shape(noise), 0.15, 0.65), 0, 1)
 
     def carried(self, at, altitude, direction, speed, scale=1.0):
         """Where the wind has brought here what was baked."""

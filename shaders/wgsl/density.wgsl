@@ -177,7 +177,7 @@ fn cloud_in(weather: LocalWeather, at: vec2f, altitude: f32) -> Column {
     var column = Column(0.0, 0.0, weather.coverage, height, rain, vec3f(at, altitude), CLOUD);
     column.profile = select(0.0, height_profile(height, weather.kind, tower(rain)), inside);
     if RAINY {
-        let spread = anvil(rain, altitude) * saturate(2.0 * weather.coverage);
+        let spread = anvil(rain, altitude) * saturate(4.0 * weather.coverage);
         column.profile = max(column.profile, spread);
         column.coverage = max(column.coverage, spread);
         column.height = min(height, 1.0);
@@ -225,7 +225,7 @@ fn cloud_shape(column: Column, width: f32) -> f32 {
     let noise = textureSampleLevel(shape_noise, repeat_sampler, origin + column.at / params.clouds.shape_scale, lod);
     var shape = with_coverage(base_shape(noise) * column.profile, column.coverage);
     if RAIN_SHAFTS && column.medium == RAIN {
-        shape = column.limit * remap01(noise.r, 0.1, 0.9);
+        shape = column.limit * remap01(base_shape(noise), 0.15, 0.65);
     }
     return select(0.0, shape, column.limit > 0.0);
 }

@@ -6,16 +6,31 @@
 // Updates after which their numbers come round, as in frame.rs.
 const UPDATES = 65536u;
 
-// Cells of the largest octave in a tile: streaks, and puffs.
+// Cells of the largest octave in a tile: of streaks, and puffs.
 const STREAKS = 4u;
 const CELLS = 12u;
-
-// What is large, even and static in the noises has a salt that no update of an octave reaches, as it is odd to 7 and 977.
-const SWIRL_SALT = 51u;
-const HOOK_SALT = 54u;
+// Cells in a tile of the patches that puffs stand in, of what bends streaks and rows, of what hooks streaks, and of where a
+// type between the two ends has more of one or of the other.
+const PATCHES = 3u;
+const SWIRLS = 3u;
+const HOOKS = 8u;
+const BLENDS = 2u;
+// How far swirls and hooks displace, for a noise of 1, in tiles.
+const SWIRL = 0.1;
 const HOOK = 0.015;
+
+// By how much the patterns differ from 0.5 for noises of 1, set by eye: streaks as deep as in the first version of this
+// layer, which had five octaves with 0.62 of the amplitude of the one before; puffs with gaps between them.
+const STREAK_CONTRAST = 0.387;
+const CELL_CONTRAST = 0.774;
+const PATCH_CONTRAST = 0.45;
+// By how much the type differs from place to place where it is halfway.
+const BLEND_CONTRAST = 1.6;
+
+// Numbers of noises, to which an octave adds up to 49 and a multiple of 977 (`octave_at`): so chosen that no two meet.
+const SWIRL_SALT = 51u;
 const BLEND_SALT = 53u;
-// Cells must not grow where streaks do.
+const HOOK_SALT = 54u;
 const PATCH_SALT = 500009u;
 const CELL_SALT = 900001u;
 
@@ -55,36 +70,32 @@ fn bake(id: vec3u, with_streaks: bool, with_cells: bool) {
 // How much of the sky they cover at a place in the tile.
 fn cover(uv: vec2f, with_streaks: bool, with_cells: bool) -> f32 {
     let p = vec3f(uv, 0.5);
-    // The field is swirled so that streaks are not ruled lines and rows bend.
     let seed = params.high_clouds.seed * 61u;
-    let swirl = vec3f(perlin(p, 3u, seed + SWIRL_SALT), perlin(p, 3u, seed + SWIRL_SALT + 1u), 0.0);
-    let at = (p + 0.1 * swirl).xy;
-    let hook = vec3f(perlin(p, 8u, seed + HOOK_SALT), perlin(p, 8u, seed + HOOK_SALT + 1u), 0.0);
-    let hooked = at + HOOK * hook.xy;
+    // Streaks are not ruled lines, and rows bend.
+    let swirl = vec2f(perlin(p, SWIRLS, seed + SWIRL_SALT), perlin(p, SWIRLS, seed + SWIRL_SALT + 1u));
+    let at = uv + SWIRL * swirl;
+    var hooked = at;
+    if with_streaks {
+        hooked += HOOK * vec2f(perlin(p, HOOKS, seed + HOOK_SALT), perlin(p, HOOKS, seed + HOOK_SALT + 1u));
+    }
     var streaks = 0.0;
     var cells = 0.0;
+    // The sum over noise(2^i x) / 2^i (gems2001, a = b = 2), not divided by that of the amplitudes: with fewer octaves the
+    // same clouds lack detail.
     var amplitude = 1.0;
-    var total = 0.0;
     var i = 0u;
     loop {
         let octave = octave_at(i);
         if with_streaks {
-            let fade = mix(
-                streak_noise(hooked, i, seed + octave.salts.x),
-                streak_noise(hooked, i, seed + octave.salts.y),
-                octave.age,
-            );
-            streaks += amplitude * fade * octave.steady;
+            let before = streak_noise(hooked, i, seed + octave.salts.x);
+            let after = streak_noise(hooked, i, seed + octave.salts.y);
+            streaks += amplitude * STREAK_CONTRAST * mix(before, after, octave.age) * octave.steady;
         }
         if with_cells {
-            let fade = mix(
-                cell_noise(at, CELLS << i, seed + CELL_SALT + octave.salts.x),
-                cell_noise(at, CELLS << i, seed + CELL_SALT + octave.salts.y),
-                octave.age,
-            );
-            cells += amplitude * fade * octave.steady;
+            let before = cell_noise(at, CELLS << i, seed + CELL_SALT + octave.salts.x);
+            let after = cell_noise(at, CELLS << i, seed + CELL_SALT + octave.salts.y);
+            cells += amplitude * CELL_CONTRAST * mix(before, after, octave.age) * octave.steady;
         }
-        total += amplitude;
         amplitude *= 0.5;
         // Left at its end: lavapipe runs a loop that is left at its start once more, for nothing.
         i++;
@@ -92,41 +103,36 @@ fn cover(uv: vec2f, with_streaks: bool, with_cells: bool) -> f32 {
             break;
         }
     }
-    streaks *= STREAK_CONTRAST / total;
-    cells *= CELL_CONTRAST / total;
     if with_cells {
-        // Puffs stand in patches, which live as long as the largest of them.
+        // They live as long as the largest puffs.
         let octave = octave_at(0u);
-        let patches = mix(
-            perlin(p + 0.1 * swirl, PATCHES, seed + PATCH_SALT + octave.salts.x),
-            perlin(p + 0.1 * swirl, PATCHES, seed + PATCH_SALT + octave.salts.y),
-            octave.age,
-        );
-        cells += PATCH_CONTRAST * patches * octave.steady;
+        let place = vec3f(at, 0.5);
+        let before = perlin(place, PATCHES, seed + PATCH_SALT + octave.salts.x);
+        let after = perlin(place, PATCHES, seed + PATCH_SALT + octave.salts.y);
+        cells += PATCH_CONTRAST * mix(before, after, octave.age) * octave.steady;
     }
-    var sum = streaks;
-    if with_cells {
-        sum = cells;
+    if !with_cells {
+        return saturate(0.5 + streaks);
     }
-    if with_streaks && with_cells {
-        let kind = params.high_clouds.type_;
-        let varied = kind + 4.0 * kind * (1.0 - kind) * perlin(p, 2u, seed + BLEND_SALT);
-        let share = saturate(varied);
-        sum = mix(streaks, cells, share) * inverseSqrt(share * share + (1.0 - share) * (1.0 - share));
+    if !with_streaks {
+        return saturate(0.5 + cells);
     }
-    return saturate(0.5 + sum);
+    let kind = params.high_clouds.type_;
+    let varied = BLEND_CONTRAST * perlin(p, BLENDS, seed + BLEND_SALT);
+    let share = saturate(kind + 4.0 * kind * (1.0 - kind) * varied);
+    return saturate(0.5 + mix(streaks, cells, share) * steadied(share));
 }
 
-const STREAK_CONTRAST = 0.75;
-const CELL_CONTRAST = 1.5;
-const PATCH_CONTRAST = 0.45;
-const PATCHES = 3u;
+// By how much a blend of two independent noises varies less than each of them; this times it does not.
+fn steadied(share: f32) -> f32 {
+    return inverseSqrt(share * share + (1.0 - share) * (1.0 - share));
+}
 
 // Where an octave is between two updates.
 struct Octave {
     salts: vec2u, // of the old and of the new
     age: f32, // 0 at the old, 1 at the new
-    steady: f32, // the variance of the blend dips halfway; this times it does not
+    steady: f32, // keeps the variance of the blend
 }
 
 fn octave_at(i: u32) -> Octave {
@@ -135,14 +141,17 @@ fn octave_at(i: u32) -> Octave {
     let update = u32(select(frame.high_update, frame.high_update_small, i >= 4u)[i % 4u]);
     // The numbers come round (frame.rs): after the last update comes the first.
     let salts = i * 7u + vec2u(update, (update + 1u) % UPDATES) * 977u;
-    return Octave(salts, age, inverseSqrt(age * age + (1.0 - age) * (1.0 - age)));
+    return Octave(salts, age, steadied(age));
 }
 
-// Perlin noise stretched along x by squeezing its cells across; whole cells a tile either way, so it tiles.
-// Small octaves are stretched more than large ones: fibres.
+// Largest stretch of an octave, as of the first one at the end of its range.
+const MAX_STRETCH = 16.0;
+
+// Perlin noise stretched along x by squeezing its cells across, small octaves more than large ones: they are fibres. Whole
+// cells a tile either way, so it tiles.
 fn streak_noise(p: vec2f, octave: u32, salt: u32) -> f32 {
     let period = f32(STREAKS << octave);
-    let stretch = sqrt(min(pow(params.high_clouds.stretch, 1.0 + 0.25 * f32(octave)), 16.0));
+    let stretch = sqrt(min(pow(params.high_clouds.stretch, 1.0 + 0.25 * f32(octave)), MAX_STRETCH));
     let across = max(u32(round(period * stretch)), 1u);
     let along = max(u32(round(period / stretch)), 1u);
     let q = fract(p) * vec2f(f32(along), f32(across));
@@ -159,17 +168,16 @@ fn streak_noise(p: vec2f, octave: u32, salt: u32) -> f32 {
     return 1.4 * mix(mix(corner[0], corner[1], w.x), mix(corner[2], corner[3], w.x), w.y);
 }
 
-// How far the points of the cells may lie from their middles, cells: half of what Worley noise has, so that puffs stand in
-// rows.
+// How far apart the points of a cell may lie, cells: less than the 1 of Worley noise, so that puffs stand in rows.
 const CELL_JITTER = 0.6;
-// Mean of 0.9 less the distance to the nearest of such points.
-const CELL_MEAN = 0.62;
+// Mean distance to the nearest of such points, cells.
+const CELL_DISTANCE = 0.388;
 
-// Inverted Worley noise in two dimensions about its mean, of points that nearly stand in rows; the rows are shifted by half
-// a cell from one to the next, as hexagons are.
+// Inverted Worley noise in two dimensions about its mean, of points that nearly stand in rows, each shifted by half a cell
+// against the next, as hexagons are. Longer across than along.
 fn cell_noise(p: vec2f, period: u32, salt: u32) -> f32 {
     let squeeze = sqrt(sqrt(params.high_clouds.stretch));
-    // An even number of rows, as every other one is shifted.
+    // An even number of rows, as every other one is shifted. No fewer than six cells in one, which `wrap_cell` asks for.
     let along = 2u * max(u32(round(0.5 * f32(period) * squeeze)), 1u);
     let across = max(u32(round(f32(period) / squeeze)), 1u);
     let q = fract(p) * vec2f(f32(along), f32(across));
@@ -186,5 +194,5 @@ fn cell_noise(p: vec2f, period: u32, salt: u32) -> f32 {
             nearest = min(nearest, dot(d, d));
         }
     }
-    return 1.0 - CELL_MEAN - sqrt(nearest);
+    return CELL_DISTANCE - sqrt(nearest);
 }

@@ -436,6 +436,24 @@ def test_the_emboss_turns_with_the_sun(renderer):
         np.testing.assert_allclose(embossed, flat, rtol=1e-5)
 
 
+def test_the_last_light_is_embossed(renderer):
+    """From 12 km one sees the layer at 8.5 km 3.5 + 3.0 degrees around the planet, where it sees
+    the sun until that is 3.0 degrees lower still. Until then nothing may be compiled out.
+    """
+
+    def seen(emboss, elevation):
+        values = {"coverage": 0.6, "optical_depth": 3.0, "emboss": emboss}
+        sun = {"sun.elevation": elevation, "sun.azimuth": 0.0, "light.model": "single"}
+        eye = np.array([0, 0, 12_000.0])
+        ahead = tuple(eye + 1000 * twin.compass(0.0, -3.2))
+        camera = nubis.Camera.look_at(tuple(eye), ahead, fov_y=1.0)
+        return renderer(*SIZE).render(camera, high_params(values, **sun))[..., 0]
+
+    flat, embossed = seen(0.0, -8.5), seen(1.0, -8.5)
+    assert flat.max() > 0 and np.abs(embossed - flat).max() > 0.01 * flat.max()
+    assert (seen(1.0, -10.0) == 0).all()
+
+
 # --- Before and behind ------------------------------------------------------------------------
 
 

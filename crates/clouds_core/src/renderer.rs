@@ -77,14 +77,7 @@ const BAKES: [(&str, &str); 2] = [("sky", "sky_map_bake"), ("sky", "sky_light_ba
 
 impl Method {
     /// The kernels of a still.
-    fn kernels(
-        self,
-        params: &Params,
-        quality: &Quality,
-        frame: &Frame,
-        variant: Variant,
-        layers: bool,
-    ) -> Vec<Wanted> {
+    fn kernels(self, params: &Params, quality: &Quality, frame: &Frame, variant: Variant, layers: bool) -> Vec<Wanted> {
         let clouds: &[_] = match self {
             _ if frame.cloudless > 0 => &[],
             Self::March if refine::coarsest(frame, quality) > 1 => &[("march", "march_list"), ("refine", "refine")],

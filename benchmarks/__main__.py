@@ -74,7 +74,7 @@ def _measure(
         parser.error(f"--size: {args.size!r} is no size such as 192x108")
     size = int(width), int(height)
     repeats = args.repeats or (2 if args.quick else 5)
-    scenes = args.scenes or list(nubis.scenes)[:: 6 if args.quick else 1]
+    scenes = args.scenes or measure.marched()[:: 6 if args.quick else 1]
     chosen = methods.quick() if args.quick else methods.full()
     if args.methods:
         known = {m.name for m in chosen} | {m.family for m in chosen}

@@ -102,6 +102,11 @@ def header(command: list[str]) -> Row:
     }
 
 
+def marched() -> list[str]:
+    """The scenes in which there is anything to march."""
+    return [name for name, (_, params) in nubis.scenes.items() if params.clouds.coverage > 0]
+
+
 def seeds(scenes: Iterable[str]) -> dict[str, dict[str, int]]:
     """The random seeds of the scenes' skies."""
     blocks = "clouds", "weather", "high_clouds"

@@ -68,7 +68,8 @@ def presets(size: Size, repeats: int) -> list[Row]:
     """Time and error of the published methods and of ours, for every scene."""
     methods = {name: nubis.quality(name) for name in PUBLISHED} | OURS
     rows = []
-    for scene, (camera, params) in tqdm(nubis.scenes.items(), unit="scene", disable=None):
+    for scene in tqdm(measure.marched(), unit="scene", disable=None):
+        camera, params = nubis.scenes[scene]
         truth = _truth(scene, size)
         for name, quality in methods.items():
             layers = nubis.Renderer(*size, quality=quality).render_layers(camera, params)

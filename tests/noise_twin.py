@@ -191,23 +191,109 @@ def broad_texels(texels, weather):
     return (noise(p) - noise(np.full((1, 3), 0.5))).clip(-0.5, 0.5)
 
 
+def evolving(noise, time, evolution, octave):
+    """gems2001: an octave fades from its last random update to its next, small ones sooner. `noise`
+    is a function of what tells one update from another.
+
+    Two independent noises of equal variance: the blend keeps it.
+    """
+    update, age = divmod(time * float(f32(evolution)) * 2**octave, 1.0)
+    old, new = (noise(7 * octave + 977 * (int(update) % 65536 + k)) for k in (0, 1))
+    return ((1 - age) * old + age * new) / math.hypot(age, 1 - age)
+
+
+def rows_of_cells(p, along, across, salt):
+    """Inverted Worley noise of points that stray by 0.3 of a cell from the middles of hexagons,
+    about its mean.
+    """
+    columns, rows = np.meshgrid(np.arange(along), np.arange(across), indexing="ij")
+    cells = np.stack([columns, rows, np.zeros_like(rows)], axis=-1)
+    points = cells[..., :2] + 0.5 + 0.6 * (random3(cells, salt)[..., :2] - 0.5)
+    points[..., 1] += 0.5 * (columns % 2)
+    size = np.array([along, across])
+    nearest = np.full(len(p), np.inf)
+    at = np.mod(p, 1) * size
+    column, row = (np.floor(at).astype(np.int64)).T
+    for i, j in itertools.product(range(-2, 3), repeat=2):
+        ring = np.stack([column + i, row + j], axis=-1)
+        wrapped = np.mod(ring, size)
+        point = points[wrapped[:, 0], wrapped[:, 1]] + (ring - wrapped)
+        nearest = np.minimum(nearest, np.linalg.norm(point - at, axis=-1))
+    return 0.388 - nearest
+
+
 def high_texels(texels, high, time):
-    """gems2001: each octave fades from its last random update to its next, smaller ones sooner."""
-    p = centres(texels, high.texture_size)
+    """gems2001: the sum over noise(2^i x) / 2^i for streaks and cells, each octave evolving."""
+    p = centres(texels, high.texture_size).reshape(-1, 2)
     seed = 61 * high.seed
-    deep = np.concatenate([p, np.full((*p.shape[:-1], 1), 0.5)], axis=-1)
-    at = p + 0.1 * np.stack([perlin(deep, 3, seed + 51), perlin(deep, 3, seed + 52)], axis=-1)
-    total, amplitudes = 0.0, 0.62 ** np.arange(high.octaves)
-    stretch = math.sqrt(f32(high.stretch))
-    for i, amplitude in enumerate(amplitudes):
-        period = [max(round(4 * 2**i * k), 1) for k in (1 / stretch, stretch)]
-        update, age = divmod(time * float(f32(high.evolution)) * 2**i, 1.0)
-        old, new = (
-            perlin(at, period, seed + 7 * i + 977 * (int(update) % 65536 + k)) for k in (0, 1)
-        )
-        # Two independent noises of equal variance: the blend keeps it.
-        total = total + amplitude * ((1 - age) * old + age * new) / math.hypot(age, 1 - age)
-    return np.clip(0.5 + 0.75 * 1.4 * total / amplitudes.sum(), 0, 1)[..., None]
+    deep = np.column_stack([p, np.full(len(p), 0.5)])
+
+    def displacement(period, salt):
+        return np.stack([perlin(deep, period, seed + salt + k) for k in (0, 1)], axis=-1)
+
+    at = p + 0.1 * displacement(3, 51)
+    hooked = at + 0.015 * displacement(8, 54)
+    stretch = float(f32(high.stretch))
+    streaks = cells = 0.0
+    for i in range(high.octaves):
+        longer = math.sqrt(min(stretch ** (1 + i / 4), 16))
+        period = [max(round(4 * 2**i * k), 1) for k in (1 / longer, longer)]
+
+        def streak(salt, period=period):
+            return 1.4 * perlin(hooked, period, seed + salt)
+
+        size = 12 * 2**i
+        along = 2 * max(round(size * stretch**0.25 / 2), 1)
+        across = max(round(size / stretch**0.25), 1)
+
+        def cell(salt, along=along, across=across):
+            return rows_of_cells(at, along, across, seed + 900001 + salt)
+
+        if high.type < 1:
+            streaks = streaks + 0.387 / 2**i * evolving(streak, time, high.evolution, i)
+        if high.type > 0:
+            cells = cells + 0.774 / 2**i * evolving(cell, time, high.evolution, i)
+
+    def patch(salt):
+        place = np.column_stack([at, np.full(len(p), 0.5)])
+        return perlin(place, 3, seed + 500009 + salt)
+
+    cells = cells + 0.45 * evolving(patch, time, high.evolution, 0)
+    kind = float(f32(high.type))
+    share = np.clip(kind + 6.4 * kind * (1 - kind) * perlin(deep, 2, seed + 53), 0, 1)
+    total = ((1 - share) * streaks + share * cells) / np.hypot(share, 1 - share)
+    return np.clip(0.5 + total, 0, 1).reshape(*np.shape(texels)[:-1], 1)
+
+
+def high_thickness(values, high):
+    """gems2001's two ways from noise to cloud: what is above a level, of the thickest."""
+    coverage = float(f32(high.coverage))
+    over = values - (1 - coverage) + 0.35 * max(2 * coverage - 1, 0) ** 2
+    if high.curve == "clamp":
+        return np.clip(2.5 * over, 0, 1)
+    over = np.maximum(over, 0)
+    return 1 - np.exp(-3 * over**2 / (over + 0.15))
+
+
+def high_clouds(points, params, time):
+    """Thickness of the high clouds at world points (N, 2), of the thickest, and how much thicker
+    they are than 0.02 tiles nearer to the sun.
+    """
+    high = params.high_clouds
+    wind = twin.compass(float(f32(high.direction)))[:2]
+    axes = np.stack([wind, [-wind[1], wind[0]]], axis=-1)
+    at = (points - time * f32(high.speed) * wind) @ axes / f32(high.scale)
+    toward = twin.sun_direction(params)[:2] @ axes
+
+    def bake(texels):
+        return half(high_texels(texels, high, time))
+
+    def read(at):
+        return sample(bake, high.texture_size, at)[:, 0]
+
+    broad = 0.4 * read(at / 3.2)
+    here, nearer = (high_thickness(0.6 * read(a) + broad, high) for a in (at, at + 0.02 * toward))
+    return here, here - nearer
 
 
 def mip(bake, texels, level):

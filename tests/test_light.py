@@ -77,55 +77,6 @@ def test_the_ground_hides_the_sun(renderer):
     np.testing.assert_array_equal(renderer().sun_transmittance(points, params), [0, 0, 0, 1])
 
 
-HIGH = {"clouds.coverage": 0.0, "high_clouds.coverage": 1.0, "high_clouds.optical_depth": 0.8}
-
-
-def test_high_clouds_shade(renderer, rng):
-    """A layer without thickness: where a slanted ray meets it, its optical depth straight up over
-    the sine of the ray's height there.
-    """
-    params = lit_params(**HIGH, **{"sun.elevation": 30.0})
-    points = rng.uniform(-20_000, 20_000, (200, 3)) * [1, 1, 0] + [0, 0, 10]
-    radius, altitude = params.atmosphere.planet_radius, params.high_clouds.altitude
-
-    def shade(points, **changes):
-        points = np.vstack([[0, 0, 0.1], points])
-        return -np.log(renderer().sun_transmittance(points, params.with_(**changes)))[1:]
-
-    slanted, sun = shade(points), twin.sun_direction(params)
-    meets = points + twin.sphere_hits(points, sun, radius, altitude)[1][:, None] * sun
-    sine = twin.normalized(twin.from_centre(meets, radius)) @ sun
-    straight = shade(meets * [1, 1, 0] + [0, 0, 10], **{"sun.elevation": 90.0})
-    assert 0.05 < straight.max() <= 0.8
-    np.testing.assert_allclose(slanted * sine, straight, rtol=1e-2, atol=1e-3)
-    twice = shade(points, **{"high_clouds.optical_depth": 1.6})
-    np.testing.assert_allclose(twice, 2 * slanted, rtol=1e-4, atol=1e-6)
-    above = points + np.array([0, 0, altitude + 100])
-    assert (renderer().sun_transmittance(above, params) == 1).all()
-
-
-def test_high_clouds_stay_where_they_are(renderer, rng):
-    """Wherever their tiles begin: a step of the eye, a second of wind or other company change
-    nothing to speak of.
-    """
-    drift = {"high_clouds.direction": 0.0, "high_clouds.speed": 10.0, "high_clouds.evolution": 0.0}
-    params = lit_params(**HIGH, **drift)
-    points = rng.uniform(-60_000, 60_000, (100, 3)) * [1, 1, 0] + [0, 0, 1000]
-    forward = renderer().sun_transmittance(points, params)
-    backward = renderer().sun_transmittance(points[::-1], params)[::-1]
-    np.testing.assert_allclose(forward, backward, atol=1e-3)
-
-    def seen(y, time):
-        camera = nubis.Camera.look_at((0, y, 100), (0, y + 1000, 500))
-        return renderer(32, 18).render_layers(camera, params, time=time)["transmittance"]
-
-    still = seen(-0.5, 0.0)
-    assert still.std() > 0.01
-    np.testing.assert_allclose(seen(0.5, 0.0), still, atol=5e-3)
-    period = params.high_clouds.scale / 10
-    np.testing.assert_allclose(seen(0, period + 0.1), seen(0, period - 0.1), atol=5e-3)
-
-
 @pytest.mark.parametrize("model", MODELS)
 def test_radiance_follows_the_sun(renderer, model):
     """Twice the irradiance is twice the light of every model: all of it comes from the sun.

@@ -155,6 +155,9 @@ def test_weather_map(rng, weather):
         (12_345.6, {"octaves": 1, "stretch": 1.0}),
         (1e9, {"octaves": 8, "stretch": 1.5, "texture_size": 333}),
         (-1e9, {"octaves": 8, "stretch": 7.3, "seed": SEED, "evolution": 0.3}),
+        (2.6e6, {"octaves": 3, "type": 1.0, "stretch": 1.0}),
+        (-77.7, {"octaves": 5, "type": 1.0, "evolution": 0.02, "seed": SEED, "stretch": 16.0}),
+        (1e9, {"octaves": 5, "type": 0.35, "texture_size": 444}),
     ],
 )
 def test_high_cloud_map(rng, time, high):

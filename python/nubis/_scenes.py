@@ -65,6 +65,43 @@ def _make() -> dict[str, tuple[Camera, Params]]:
             _look((0, 0, 200), 300, 25),
             fair.with_(**{"clouds.coverage": 0.25, "high_clouds.coverage": 0.6}),
         ),
+        "mackerel": (
+            _look((0, 0, 200), 330, 24),
+            fair.with_(
+                **{
+                    "clouds.coverage": 0.0,
+                    "high_clouds.type": 1.0,
+                    "high_clouds.coverage": 0.5,
+                    "high_clouds.altitude": 4500.0,
+                    "high_clouds.optical_depth": 3.0,
+                    "high_clouds.scale": 16000.0,
+                    "high_clouds.stretch": 4.0,
+                    "high_clouds.emboss": 0.6,
+                    "high_clouds.direction": 20.0,
+                    "high_clouds.speed": 12.0,
+                    "sun.elevation": 30.0,
+                }
+            ),
+        ),
+        "procedural_sky": (
+            _look((0, 0, 200), 100, 22),
+            fair.with_(
+                **{
+                    "clouds.coverage": 0.0,
+                    "high_clouds.type": 0.6,
+                    "high_clouds.coverage": 0.5,
+                    "high_clouds.altitude": 2500.0,
+                    "high_clouds.optical_depth": 5.0,
+                    "high_clouds.scale": 18000.0,
+                    "high_clouds.stretch": 1.5,
+                    "high_clouds.emboss": 0.7,
+                    "high_clouds.speed": 10.0,
+                    "high_clouds.evolution": 0.002,
+                    "sun.elevation": 12.0,
+                    "sun.azimuth": 140.0,
+                }
+            ),
+        ),
     }
 
 

@@ -246,7 +246,10 @@ class HighClouds(Block):
     Attributes
     ----------
     coverage : float
-        How much of the sky they cover. Allowed: a number from 0 to 1.
+        How much of the sky they cover: 0 is clear, 1 overcast. Allowed: a number from 0 to 1.
+    type : float
+        Cloud type: 0 cirrus in streaks, 1 altocumulus in cells, and between them both, here more of
+        one, there of the other. Allowed: a number from 0 to 1.
     altitude : float
         Altitude of the layer. Allowed: a number from 100 to 30000 m.
     optical_depth : float
@@ -254,9 +257,14 @@ class HighClouds(Block):
         to 100.
     scale : float
         Width of one tile of the texture. Allowed: a number from 1000 to 1000000 m.
+    curve : {exponential, clamp}
+        How thickness grows with what rises above the cover. Allowed: one of "exponential", "clamp".
+    emboss : float
+        How strongly the flanks toward the sun are bright and those away from it dark (gems2001).
+        Allowed: a number from 0 to 1.
     stretch : float
-        How much longer than wide the streaks are: 1 gives altocumulus, more gives cirrus. Allowed:
-        a number from 1 to 16.
+        How much longer than wide the streaks are, along the wind; cells are stretched by its square
+        root, across it. Allowed: a number from 1 to 16.
     direction : float
         Compass direction toward which they drift; the streaks lie along it. Allowed: a number from
         -360 to 360 degrees.
@@ -274,9 +282,12 @@ class HighClouds(Block):
     """
 
     coverage: float = 0.5
+    type: float = 0.0
     altitude: float = 8500.0
     optical_depth: float = 0.5
     scale: float = 42000.0
+    curve: Literal["exponential", "clamp"] = "exponential"
+    emboss: float = 0.0
     stretch: float = 3.0
     direction: float = 75.0
     speed: float = 25.0

@@ -184,7 +184,11 @@ fn ambient_of(sky: vec3f) -> vec3f {
 }
 
 fn ambient_below() -> vec3f {
-    return params.light.ambient + params.light.ambient_gain * params.light.ambient_bottom * sky_light[1].rgb;
+    return ambient_below_of(sky_light[1].rgb);
+}
+
+fn ambient_below_of(light: vec3f) -> vec3f {
+    return params.light.ambient + params.light.ambient_gain * params.light.ambient_bottom * light;
 }
 
 // What a ray has gathered on its way through the clouds. Scalars alone are summed; colours come once, at the end.

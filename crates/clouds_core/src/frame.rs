@@ -57,6 +57,10 @@ params! {
         camera_kind: u32 = 0;
         /// 1 where there are high clouds, for which `composite` is compiled.
         high_clouds: u32 = 0;
+        /// 1 where they are embossed and the sun reaches any of them in sight, for which `composite` is compiled.
+        high_emboss: u32 = 0;
+        /// 1 where the sun is so low that it shines on each of them in its own way, for which `composite` is compiled.
+        high_low_sun: u32 = 0;
         /// 1 where nothing has been marched, as there are no clouds, for which `composite` is compiled.
         cloudless: u32 = 0;
         /// Tangent of half the vertical field of view.
@@ -181,6 +185,13 @@ params! {
 /// How much larger the second read of the high clouds' texture is than the first (as in high_layer.wgsl).
 const HIGH_BROAD: f32 = 3.2;
 
+/// Sine of the sun's height, 20 degrees, above which its light is as good as the same on all high clouds in sight (as in
+/// passes/composite.wgsl).
+const HIGH_LOW_SUN: f64 = 0.342;
+
+/// What the sun's half width, 0.005 as in atmosphere.wgsl, and f32 may add to its height, radians.
+const HALF_SUN: f64 = 0.006;
+
 /// Altitude where the air ends, m (Hillaire 2020).
 const AIR_TOP: f64 = 100_000.0;
 
@@ -233,6 +244,7 @@ impl Frame {
         frame.sun_volume_eye = sun_volume::eye_in(camera.eye, params, time);
         frame.high_clouds = u32::from(params.high_clouds.coverage > 0.0);
         frame.sun_direction = sun_direction(params).as_vec3().to_array();
+        frame.set_high_sun(params);
         frame
     }
 
@@ -255,6 +267,20 @@ impl Frame {
         let cosine = Vec3::from_array(self.zenith).dot(Vec3::from_array(self.sun_direction));
         // The sun's half degree, and what f32 may be off.
         f64::from(cosine) - horizon > -0.005 - 1e-5 && params.sun.irradiance != [0.0; 3]
+    }
+
+    /// What the sun asks of the high clouds.
+    fn set_high_sun(&mut self, params: &Params) {
+        let radius = f64::from(params.atmosphere.planet_radius);
+        let dip = |altitude: f32| (radius / (radius + f64::from(altitude.max(0.0)))).acos();
+        let sine = f64::from(Vec3::from_array(self.zenith).dot(Vec3::from_array(self.sun_direction)));
+        // The farthest of them in sight is as far around the planet as the horizons of the eye and of the layer lie apart,
+        // and sees the sun until it is under a horizon of its own.
+        let layer = dip(params.high_clouds.altitude);
+        let lowest = -(dip(self.altitude) + 2.0 * layer + HALF_SUN);
+        let up = sine.clamp(-1.0, 1.0).asin() > lowest && params.sun.irradiance != [0.0; 3];
+        self.high_emboss = u32::from(up && params.high_clouds.emboss > 0.0);
+        self.high_low_sun = u32::from(sine < HIGH_LOW_SUN);
     }
 
     fn set_camera(&mut self, camera: &Camera) {

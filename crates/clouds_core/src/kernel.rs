@@ -76,6 +76,10 @@ pub(crate) struct Variant {
     pub camera: u32,
     /// Whether there are high clouds, for `composite`.
     pub high: bool,
+    /// Whether those are embossed, for `composite`.
+    pub high_emboss: bool,
+    /// Whether the sun is so low that each of those has its own sunlight, for `composite`.
+    pub high_low_sun: bool,
     /// Whether nothing has been marched, for `composite`.
     pub cloudless: bool,
     /// Whether the sky and the depth are asked for, for `composite`.
@@ -102,6 +106,8 @@ impl Variant {
             // What single passes ask for beside.
             camera: 0,
             high: false,
+            high_emboss: false,
+            high_low_sun: false,
             cloudless: false,
             layers: false,
         }
@@ -117,7 +123,7 @@ impl Variant {
         Self { sunlit: frame.sunlit(params), camera: frame.camera_kind, ..Self::new(params, quality) }
     }
 
-    fn constants(self) -> [(&'static str, f64); 16] {
+    fn constants(self) -> [(&'static str, f64); 18] {
         let switch = |on| f64::from(u8::from(on));
         [
             ("MODEL", f64::from(self.model as u32)),
@@ -134,6 +140,8 @@ impl Variant {
             ("LIGHT_CHEAP", switch(self.light_cheap)),
             ("CAMERA", f64::from(self.camera)),
             ("HIGH", switch(self.high)),
+            ("HIGH_EMBOSS", switch(self.high_emboss)),
+            ("HIGH_LOW_SUN", switch(self.high_low_sun)),
             ("CLOUDLESS", switch(self.cloudless)),
             ("LAYERS", switch(self.layers)),
         ]

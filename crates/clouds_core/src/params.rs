@@ -21,6 +21,16 @@ choice! {
 }
 
 choice! {
+    /// How the texture of the high clouds becomes thickness.
+    Curve {
+        /// Ever less the denser it is: soft edges and even cores (gems2001's "condensation").
+        Exponential = "exponential",
+        /// In proportion to what is above a level, up to the thickest (gems2001: subtract and clamp).
+        Clamp = "clamp",
+    }
+}
+
+choice! {
     /// How sunlight becomes the brightness of a cloud.
     Model {
         /// Physical single scattering and nothing else.
@@ -164,15 +174,21 @@ params! {
 
     /// The thin high clouds, a layer without thickness on its own sphere (nubis2015; animated as in gems2001).
     HighClouds {
-        /// How much of the sky they cover.
+        /// How much of the sky they cover: 0 is clear, 1 overcast.
         coverage: f32 = 0.5, in 0..=1 "";
+        /// Cloud type: 0 cirrus in streaks, 1 altocumulus in cells, and between them both, here more of one, there of the other.
+        r#type: f32 = 0.0, in 0..=1 "";
         /// Altitude of the layer.
         altitude: f32 = 8500.0, in 100..=30000 "m";
         /// Optical depth, seen from straight below, where they are thickest.
         optical_depth: f32 = 0.5, in 0..=100 "";
         /// Width of one tile of the texture.
         scale: f32 = 42000.0, in 1000..=1000000 "m";
-        /// How much longer than wide the streaks are: 1 gives altocumulus, more gives cirrus.
+        /// How thickness grows with what rises above the cover.
+        curve: Curve = Curve::Exponential;
+        /// How strongly the flanks toward the sun are bright and those away from it dark (gems2001).
+        emboss: f32 = 0.0, in 0..=1 "";
+        /// How much longer than wide the streaks are, along the wind; cells are stretched by its square root, across it.
         stretch: f32 = 3.0, in 1..=16 "";
         /// Compass direction toward which they drift; the streaks lie along it.
         direction: f32 = 75.0, in -360..=360 "degrees";
@@ -347,7 +363,11 @@ impl Params {
         for (name, edges) in edges.into_iter().chain([("cumulonimbus", cumulonimbus)]) {
             if !edges.is_sorted() {
                 let name = format!("clouds.{name}");
-                return Err(Error::parameter(&name, format!("{edges:?}"), "four fractions of the height in rising order"));
+                return Err(Error::parameter(
+                    &name,
+                    format!("{edges:?}"),
+                    "four fractions of the height in rising order",
+                ));
             }
         }
         let upper = &self.upper_clouds;
@@ -356,7 +376,8 @@ impl Params {
             return Err(Error::parameter("upper_clouds.top", upper.top, allowed));
         }
         if upper.coverage > 0.0 && upper.base < self.clouds.top {
-            let allowed = format!("at or above clouds.top = {} m where upper_clouds.coverage is not 0", self.clouds.top);
+            let allowed =
+                format!("at or above clouds.top = {} m where upper_clouds.coverage is not 0", self.clouds.top);
             return Err(Error::parameter("upper_clouds.base", upper.base, allowed));
         }
         Ok(())
@@ -490,7 +511,8 @@ fn check_block(name: &str, block: &dyn Block) -> Result<()> {
 
 /// A block by the name that Python calls its type: every block of [`Params`], and [`Quality`].
 pub fn block(type_name: &str) -> Option<Box<dyn Block>> {
-    let Params { sun, clouds, upper_clouds, weather, wind, high_clouds, light, atmosphere, volume: _ } = Params::default();
+    let Params { sun, clouds, upper_clouds, weather, wind, high_clouds, light, atmosphere, volume: _ } =
+        Params::default();
     let quality = Quality::default();
     let blocks: [Box<dyn Block>; 9] = [
         Box::new(sun),

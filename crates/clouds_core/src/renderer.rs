@@ -17,7 +17,7 @@ use crate::kernel::{Kernel, Variant, Wanted};
 use crate::params::{Model, Params, Quality};
 use crate::passes::broad_weather::BroadWeather;
 use crate::passes::composite::Composed;
-use crate::passes::high_clouds::HighClouds;
+use crate::passes::high_clouds::{self, HighClouds};
 use crate::passes::majorant::Majorants;
 use crate::passes::march::Marched;
 use crate::passes::noise::Noise;
@@ -75,21 +75,29 @@ enum Method {
 }
 
 /// The kernels of the bakes that are kept from no earlier process.
-const BAKES: [(&str, &str); 3] = [("high_clouds", "high_clouds"), ("sky", "sky_map_bake"), ("sky", "sky_light_bake")];
+const BAKES: [(&str, &str); 2] = [("sky", "sky_map_bake"), ("sky", "sky_light_bake")];
 
 impl Method {
     /// The kernels of a still.
-    fn kernels(self, quality: &Quality, frame: &Frame, variant: Variant, layers: bool) -> Vec<Wanted> {
+    fn kernels(self, params: &Params, quality: &Quality, frame: &Frame, variant: Variant, layers: bool) -> Vec<Wanted> {
         let clouds: &[_] = match self {
+            _ if frame.cloudless > 0 => &[],
             Self::March if refine::coarsest(frame, quality) > 1 => &[("march", "march_list"), ("refine", "refine")],
             Self::March => &[("march", "march")],
             Self::Reference => &[("reference", "reference")],
             Self::Path => &[("path", "path")],
         };
         let with = |variant| move |&(pass, entry): &(&'static str, &'static str)| (pass, entry, variant);
-        let bakes = BAKES.iter().map(with(Variant::bake()));
+        let high = params.high_clouds.coverage > 0.0;
+        let high = high.then(|| ("high_clouds", high_clouds::kernel(&params.high_clouds)));
+        let bakes = high.into_iter().chain(BAKES).map(|(pass, entry)| (pass, entry, Variant::bake()));
         let composite = ("composite", "composite", composite::variant(variant, frame, layers));
         bakes.chain(clouds.iter().map(with(variant))).chain([composite]).collect()
+    }
+
+    /// Whether there is nothing to march.
+    fn is_cloudless(self, params: &Params) -> bool {
+        !params.has_clouds() && self == Self::March
     }
 
     fn new(params: &Params, quality: &Quality) -> Self {
@@ -233,11 +241,10 @@ impl Renderer {
         frame.background = u32::from(background);
         frame.first_sample = first_sample;
         let method = Method::new(params, &self.quality);
-        frame.cloudless =
-            u32::from(!params.has_clouds() && method == Method::March);
+        frame.cloudless = u32::from(method.is_cloudless(params));
         let Self { gpu, world, quality, timings, .. } = self;
         let variant = Variant::of_frame(params, quality, &frame);
-        let scene = gpu.compiling(&method.kernels(quality, &frame, variant, all), || {
+        let scene = gpu.compiling(&method.kernels(params, quality, &frame, variant, all), || {
             world.run(gpu, params, &frame, (camera.eye, time), quality, timings, interrupt)
         })?;
 
@@ -320,6 +327,7 @@ impl Renderer {
         }
         let mut frame = self.begin(camera, params, time)?;
         frame.background = u32::from(background);
+        frame.cloudless = u32::from(Method::March.is_cloudless(params));
         let [width, height] = self.size;
         let pixels = u64::from(width) * u64::from(height);
         if 16 * pixels > self.gpu.max_buffer {
@@ -343,6 +351,8 @@ impl Renderer {
         });
         // Taken out while the frame is in the making: if it fails, the next one starts anew.
         let last = animation.last.take().filter(|last| !last.is_cut(camera, params, time));
+        // A frame without clouds leaves no history.
+        let last = last.filter(|last| last.frame.cloudless == frame.cloudless);
         let index = last.as_ref().map_or(0, |last| last.index + 1);
         if let Some(last) = &last {
             frame.set_previous(&last.frame, camera.eye - last.camera.eye, params, time - last.time);
@@ -353,13 +363,15 @@ impl Renderer {
         let round = if frame.moving > 0 { index / 16 } else { 0 };
         frame.jitter_shift = (f64::from(round) * 0.618_033_988_749_895).fract() as f32;
         let variant = Variant::of_frame(params, quality, &frame);
-        let scene = gpu.compiling(&Method::March.kernels(quality, &frame, variant, false), || {
+        let scene = gpu.compiling(&Method::March.kernels(params, quality, &frame, variant, false), || {
             world.run(gpu, params, &frame, (camera.eye, time), quality, timings, interrupt)
         })?;
 
         let mut ctx = Context { gpu, uniforms: scene.uniforms, variant: scene.variant, timings, interrupt };
         let Animation { refined, fresh, before, now, composed, .. } = &*animation;
-        if last.is_none() {
+        if frame.cloudless > 0 {
+            frame.sheet_rows = height;
+        } else if last.is_none() {
             frame.sheet_rows = height;
             march_sheet(&mut ctx, &scene, &mut frame, quality, &mut self.march_pace, refined, now)?;
         } else {
@@ -372,7 +384,7 @@ impl Renderer {
         let mut image = Vec::with_capacity(4 * pixels as usize);
         in_bands(&mut self.pixel_pace, gpu, &scene, &mut frame, [width, height], |frame| {
             let mut work = gpu.work();
-            if last.is_some() {
+            if last.is_some() && frame.cloudless == 0 {
                 reproject::run(gpu, &mut work, &scene, frame, fresh, before, now)?;
             }
             composite::run(gpu, &mut work, &scene, frame, now, composed, false)?;
@@ -602,7 +614,8 @@ impl World {
         let blue_noise = vec![("blue_noise", (&self.blue_noise).into())];
         let uniforms = self.uniforms.bindings();
         let mut bindings: Bindings<'_> =
-            [uniforms, noise.bindings(), weather, broad_weather, profile, high_clouds, sky, volume, blue_noise].concat();
+            [uniforms, noise.bindings(), weather, broad_weather, profile, high_clouds, sky, volume, blue_noise]
+                .concat();
         let majorants = self.majorants.run(&mut ctx, params, &bindings)?; // when paths are traced
         bindings.extend(majorants);
         let sun_volume = self.sun_volume.run(&mut ctx, params, frame, at, &bindings)?; // as clouds and eye move

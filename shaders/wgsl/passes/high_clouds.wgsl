@@ -1,13 +1,56 @@
-// Bakes the texture of the high clouds: octaves of noise that are replaced at their own rates (gems2001).
+// Bakes the texture of the high clouds: octaves of noise that are replaced at their own rates (gems2001), of two
+// patterns: the streaks of cirrus and the cells of altocumulus.
 #import bindings
 #import gradient_noise
 
 // Updates after which their numbers come round, as in frame.rs.
 const UPDATES = 65536u;
 
-// Two texels in each invocation, as one number of the buffer holds them; its rows are padded as copies ask for.
+// Cells of the largest octave in a tile: of streaks, and puffs.
+const STREAKS = 4u;
+const CELLS = 12u;
+// Cells in a tile of the patches that puffs stand in, of what bends streaks and rows, of what hooks streaks, and of where a
+// type between the two ends has more of one or of the other.
+const PATCHES = 3u;
+const SWIRLS = 3u;
+const HOOKS = 8u;
+const BLENDS = 2u;
+// How far swirls and hooks displace, for a noise of 1, in tiles.
+const SWIRL = 0.1;
+const HOOK = 0.015;
+
+// By how much the patterns differ from 0.5 for noises of 1, set by eye: streaks as deep as in the first version of this
+// layer, which had five octaves with 0.62 of the amplitude of the one before; puffs with gaps between them.
+const STREAK_CONTRAST = 0.387;
+const CELL_CONTRAST = 0.774;
+const PATCH_CONTRAST = 0.45;
+// By how much the type differs from place to place where it is halfway.
+const BLEND_CONTRAST = 1.6;
+
+// Numbers of noises, to which an octave adds up to 49 and a multiple of 977 (`octave_at`): so chosen that no two meet.
+const SWIRL_SALT = 51u;
+const BLEND_SALT = 53u;
+const HOOK_SALT = 54u;
+const PATCH_SALT = 500009u;
+const CELL_SALT = 900001u;
+
 @compute @workgroup_size(8, 8)
 fn high_clouds(@builtin(global_invocation_id) id: vec3u) {
+    bake(id, true, false);
+}
+
+@compute @workgroup_size(8, 8)
+fn high_clouds_cells(@builtin(global_invocation_id) id: vec3u) {
+    bake(id, false, true);
+}
+
+@compute @workgroup_size(8, 8)
+fn high_clouds_mixed(@builtin(global_invocation_id) id: vec3u) {
+    bake(id, true, true);
+}
+
+// Two texels in each invocation, as one number of the buffer holds them; its rows are padded as copies ask for.
+fn bake(id: vec3u, with_streaks: bool, with_cells: bool) {
     let size = params.high_clouds.texture_size;
     if 2u * id.x >= size || id.y >= size {
         return;
@@ -15,7 +58,7 @@ fn high_clouds(@builtin(global_invocation_id) id: vec3u) {
     var pair = vec2f(0.0);
     var x = 2u * id.x;
     loop {
-        pair = vec2f(pair.y, cover((vec2f(vec2u(x, id.y)) + 0.5) / f32(size)));
+        pair = vec2f(pair.y, cover((vec2f(vec2u(x, id.y)) + 0.5) / f32(size), with_streaks, with_cells));
         if x % 2u == 1u {
             break;
         }
@@ -25,42 +68,93 @@ fn high_clouds(@builtin(global_invocation_id) id: vec3u) {
 }
 
 // How much of the sky they cover at a place in the tile.
-fn cover(uv: vec2f) -> f32 {
+fn cover(uv: vec2f, with_streaks: bool, with_cells: bool) -> f32 {
     let p = vec3f(uv, 0.5);
-    // Streaks lie along x: fewer cells along than across. The field is swirled so that they are not ruled lines.
     let seed = params.high_clouds.seed * 61u;
-    let swirl = vec3f(perlin(p, 3u, seed + 51u), perlin(p, 3u, seed + 52u), 0.0);
-    let at = p + 0.1 * swirl;
-    var sum = 0.0;
-    var total = 0.0;
+    // Streaks are not ruled lines, and rows bend.
+    let swirl = vec2f(perlin(p, SWIRLS, seed + SWIRL_SALT), perlin(p, SWIRLS, seed + SWIRL_SALT + 1u));
+    let at = uv + SWIRL * swirl;
+    var hooked = at;
+    if with_streaks {
+        hooked += HOOK * vec2f(perlin(p, HOOKS, seed + HOOK_SALT), perlin(p, HOOKS, seed + HOOK_SALT + 1u));
+    }
+    var streaks = 0.0;
+    var cells = 0.0;
+    // The sum over noise(2^i x) / 2^i (gems2001, a = b = 2), not divided by that of the amplitudes: with fewer octaves the
+    // same clouds lack detail.
     var amplitude = 1.0;
     var i = 0u;
     loop {
-        // Small octaves are replaced more often; between two updates each fades linearly from the old to the new.
-        let age = select(frame.high_age, frame.high_age_small, i >= 4u)[i % 4u];
-        let update = u32(select(frame.high_update, frame.high_update_small, i >= 4u)[i % 4u]);
-        let before = streaks(at, 4u << i, seed + i * 7u + update * 977u);
-        // The numbers come round (frame.rs): after the last update comes the first.
-        let after = streaks(at, 4u << i, seed + i * 7u + (update + 1u) % UPDATES * 977u);
-        // The variance of the blend dips halfway; dividing it out keeps the cover steady.
-        let steady = inverseSqrt(age * age + (1.0 - age) * (1.0 - age));
-        sum += amplitude * mix(before, after, age) * steady;
-        total += amplitude;
-        amplitude *= 0.62;
+        let octave = octave_at(i);
+        if with_streaks {
+            let before = streak_noise(hooked, i, seed + octave.salts.x);
+            let after = streak_noise(hooked, i, seed + octave.salts.y);
+            streaks += amplitude * STREAK_CONTRAST * mix(before, after, octave.age) * octave.steady;
+        }
+        if with_cells {
+            let before = cell_noise(at, CELLS << i, seed + CELL_SALT + octave.salts.x);
+            let after = cell_noise(at, CELLS << i, seed + CELL_SALT + octave.salts.y);
+            cells += amplitude * CELL_CONTRAST * mix(before, after, octave.age) * octave.steady;
+        }
+        amplitude *= 0.5;
         // Left at its end: lavapipe runs a loop that is left at its start once more, for nothing.
         i++;
         if i >= params.high_clouds.octaves {
             break;
         }
     }
-    return saturate(0.5 + 0.75 * sum / total);
+    if with_cells {
+        // They live as long as the largest puffs.
+        let octave = octave_at(0u);
+        let place = vec3f(at, 0.5);
+        let before = perlin(place, PATCHES, seed + PATCH_SALT + octave.salts.x);
+        let after = perlin(place, PATCHES, seed + PATCH_SALT + octave.salts.y);
+        cells += PATCH_CONTRAST * mix(before, after, octave.age) * octave.steady;
+    }
+    if !with_cells {
+        return saturate(0.5 + streaks);
+    }
+    if !with_streaks {
+        return saturate(0.5 + cells);
+    }
+    let kind = params.high_clouds.type_;
+    let varied = BLEND_CONTRAST * perlin(p, BLENDS, seed + BLEND_SALT);
+    let share = saturate(kind + 4.0 * kind * (1.0 - kind) * varied);
+    return saturate(0.5 + mix(streaks, cells, share) * steadied(share));
 }
 
-// Perlin noise stretched along x by squeezing its cells across; whole cells a tile either way, so it tiles.
-fn streaks(p: vec3f, period: u32, salt: u32) -> f32 {
-    let across = max(u32(round(f32(period) * sqrt(params.high_clouds.stretch))), 1u);
-    let along = max(u32(round(f32(period) / sqrt(params.high_clouds.stretch))), 1u);
-    let q = fract(p.xy) * vec2f(f32(along), f32(across));
+// By how much a blend of two independent noises varies less than each of them; this times it does not.
+fn steadied(share: f32) -> f32 {
+    return inverseSqrt(share * share + (1.0 - share) * (1.0 - share));
+}
+
+// Where an octave is between two updates.
+struct Octave {
+    salts: vec2u, // of the old and of the new
+    age: f32, // 0 at the old, 1 at the new
+    steady: f32, // keeps the variance of the blend
+}
+
+fn octave_at(i: u32) -> Octave {
+    // Small octaves are replaced more often; between two updates each fades linearly from the old to the new.
+    let age = select(frame.high_age, frame.high_age_small, i >= 4u)[i % 4u];
+    let update = u32(select(frame.high_update, frame.high_update_small, i >= 4u)[i % 4u]);
+    // The numbers come round (frame.rs): after the last update comes the first.
+    let salts = i * 7u + vec2u(update, (update + 1u) % UPDATES) * 977u;
+    return Octave(salts, age, steadied(age));
+}
+
+// Largest stretch of an octave, as of the first one at the end of its range.
+const MAX_STRETCH = 16.0;
+
+// Perlin noise stretched along x by squeezing its cells across, small octaves more than large ones: they are fibres. Whole
+// cells a tile either way, so it tiles.
+fn streak_noise(p: vec2f, octave: u32, salt: u32) -> f32 {
+    let period = f32(STREAKS << octave);
+    let stretch = sqrt(min(pow(params.high_clouds.stretch, 1.0 + 0.25 * f32(octave)), MAX_STRETCH));
+    let across = max(u32(round(period * stretch)), 1u);
+    let along = max(u32(round(period / stretch)), 1u);
+    let q = fract(p) * vec2f(f32(along), f32(across));
     let cell = vec2i(floor(q));
     let f = q - floor(q);
     let w = f * f * f * (f * (f * 6.0 - 15.0) + 10.0);
@@ -72,4 +166,33 @@ fn streaks(p: vec3f, period: u32, salt: u32) -> f32 {
         corner[i] = dot(gradient, f - vec2f(o));
     }
     return 1.4 * mix(mix(corner[0], corner[1], w.x), mix(corner[2], corner[3], w.x), w.y);
+}
+
+// How far apart the points of a cell may lie, cells: less than the 1 of Worley noise, so that puffs stand in rows.
+const CELL_JITTER = 0.6;
+// Mean distance to the nearest of such points, cells.
+const CELL_DISTANCE = 0.388;
+
+// Inverted Worley noise in two dimensions about its mean, of points that nearly stand in rows, each shifted by half a cell
+// against the next, as hexagons are. Longer across than along.
+fn cell_noise(p: vec2f, period: u32, salt: u32) -> f32 {
+    let squeeze = sqrt(sqrt(params.high_clouds.stretch));
+    // An even number of rows, as every other one is shifted. No fewer than six cells in one, which `wrap_cell` asks for.
+    let along = 2u * max(u32(round(0.5 * f32(period) * squeeze)), 1u);
+    let across = max(u32(round(f32(period) / squeeze)), 1u);
+    let q = fract(p) * vec2f(f32(along), f32(across));
+    let column = i32(floor(q.x));
+    var nearest = 4.0;
+    for (var x = -1; x <= 1; x++) {
+        let shift = 0.5 * f32((column + x) & 1);
+        let row = i32(floor(q.y - shift));
+        for (var y = -1; y <= 1; y++) {
+            let cell = wrap_cell(vec3i(column + x, row + y, 0), vec3i(i32(along), i32(across), 1));
+            let jitter = CELL_JITTER * (random3(cell, salt).xy - 0.5);
+            let point = vec2f(f32(column + x), f32(row + y) + shift) + 0.5 + jitter;
+            let d = point - q;
+            nearest = min(nearest, dot(d, d));
+        }
+    }
+    return CELL_DISTANCE - sqrt(nearest);
 }

@@ -48,5 +48,13 @@ pub(crate) fn run(
 
 /// What it is made for.
 pub(crate) fn variant(of: Variant, frame: &Frame, layers: bool) -> Variant {
-    Variant { high: frame.high_clouds > 0, cloudless: frame.cloudless > 0, layers, ..of }
+    let high = frame.high_clouds > 0;
+    Variant {
+        high,
+        high_emboss: high && frame.high_emboss > 0,
+        high_low_sun: high && frame.high_low_sun > 0,
+        cloudless: frame.cloudless > 0,
+        layers,
+        ..of
+    }
 }

@@ -36,7 +36,10 @@ struct Origin {
 impl Origin {
     fn new(eye: DVec3, params: &Params, time: f64) -> Self {
         let wind = &params.wind;
-        let fastest = [wind.speed, wind.weather_speed, wind.updraft, params.upper_clouds.speed].map(f32::abs).into_iter().fold(0.1, f32::max);
+        let fastest = [wind.speed, wind.weather_speed, wind.updraft, params.upper_clouds.speed]
+            .map(f32::abs)
+            .into_iter()
+            .fold(0.1, f32::max);
         let period = CLOUD_STEP / f64::from(fastest);
         let place = (eye.truncate() / EYE_STEP).round();
         let steps = [place.x as i64, place.y as i64, (time / period).floor() as i64];

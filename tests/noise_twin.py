@@ -258,39 +258,88 @@ def bakes(params):
     }
 
 
+def turns(wander, channel):
+    """Angular velocities (1/s) and phases of the four turns of a wander; 0 is the wind, 1 the
+    cover.
+    """
+    k = np.arange(4)
+    period = f32(wander.period) * 3 ** ((k - 1.5) / 4)
+    keys = np.stack([np.full(4, wander.seed), k, np.full(4, channel)], axis=-1)
+    phase = 2 * np.pi * pcg3d(keys)[..., 0] / 2**32
+    return (-1.0) ** k * 2 * np.pi / period, phase
+
+
+def blown(params, degrees, speed, time):
+    """Where a wind has carried what it carries, m (east, north): the integral of its velocity from
+    0 to `time`, by Gauss-Legendre quadrature on pieces of an eighth of the shortest period, which
+    is exact to 1e-15.
+
+    The velocity is the mean one, stretched and turned by 1 + share * (mean of four unit vectors
+    that turn), in complex numbers.
+    """
+    rate, phase = turns(params.wander, 0)
+    pieces = int(np.ceil(abs(time) * np.abs(rate).max() / 2 / np.pi * 8)) + 1
+    ends = np.linspace(0, time, pieces + 1)
+    nodes, weights = np.polynomial.legendre.leggauss(12)
+    half = 0.5 * np.diff(ends)[:, None]
+    at = 0.5 * (ends[:-1, None] + ends[1:, None]) + half * nodes
+    gust = np.exp(1j * (rate * at[..., None] + phase)).mean(axis=-1)
+    seconds = time + f32(params.wander.wind) * (half * weights * gust).sum()
+    east, north, _ = twin.compass(float(f32(degrees))) * f32(speed)
+    way = (east + 1j * north) * seconds
+    return np.array([way.real, way.imag])
+
+
+def cover(params, time):
+    """The mean cover, and what wanders, in steps of a 1024th."""
+    rate, phase = turns(params.wander, 1)
+    swing = np.round(np.sin(rate * time + phase).mean() * 1024) / 1024
+    return float(np.clip(f32(params.clouds.coverage) + f32(params.wander.coverage) * swing, 0, 1))
+
+
+def kept_clear(points, weather):
+    """The share of the cover that is left: none within the radius, all of it from half a radius
+    outside.
+    """
+    radius = float(f32(weather.clear_radius))
+    if radius == 0:
+        return 1.0
+    away = np.linalg.norm(points[:, :2] - f32(weather.clear_at), axis=1)
+    return smoothstep(radius, 1.5 * radius, away)
+
+
 def extinction(points, params, time, gradients, textures):
     """The whole sampler of nubis2015 at world points, in 1/m. `gradients`: the three of its height
     profile; `textures`: texels to values, as `bakes` has them.
     """
+    params = params.with_(**{"clouds.coverage": cover(params, time)})
     clouds, weather, wind = params.clouds, params.weather, params.wind
     altitude = twin.altitude(points, float(f32(params.atmosphere.planet_radius)))
     height = (altitude - f32(clouds.base)) / (f32(clouds.top) - f32(clouds.base))
-    downwind, weather_wind = (
-        twin.compass(float(f32(degrees)))[:2]
-        for degrees in (wind.direction, wind.weather_direction)
-    )
+    downwind = twin.compass(float(f32(wind.direction)))[:2]
     upright = points[:, :2] - f32(wind.shear) * height[:, None] * downwind
 
-    def carried(at, speed):
+    def carried(at, direction, speed):
         """Where the wind has brought here what was baked."""
-        at = at - time * f32(speed) * downwind
+        at = at - blown(params, direction, speed, time)
         return np.column_stack([at, altitude - time * f32(wind.updraft)])
 
     # Column 0 is the west, row 0 the north, and the origin of the world the middle of the map.
     size = WEATHER_SIZE if weather.map is None else weather.map.shape[1::-1]
-    on_map = upright - time * f32(wind.weather_speed) * weather_wind
+    on_map = upright - blown(params, wind.weather_direction, wind.weather_speed, time)
     texel = sample(
         textures["weather_map"], size, 0.5 + on_map / f32(weather.extent) * np.array([1, -1])
     )
     coverage, kind, _ = weather_from_map(texel[:, :3], clouds)
-    at = carried(upright, wind.speed) / f32(clouds.shape_scale)
+    coverage = coverage * kept_clear(points, weather)
+    at = carried(upright, wind.direction, wind.speed) / f32(clouds.shape_scale)
     noise = sample(textures["shape_noise"], SHAPE_SIZE, at)
     shape = with_coverage(base_shape(noise) * height_profile(height, kind, gradients), coverage)
 
-    at = carried(upright, wind.detail_speed)[:, :2] / f32(clouds.curl_scale)
+    at = carried(upright, wind.detail_direction, wind.detail_speed)[:, :2] / f32(clouds.curl_scale)
     swirl = sample(textures["curl_noise"], CURL_SIZE, at)[:, :2]
     swirled = upright + f32(clouds.curl) * (1 - height[:, None]) * swirl
-    at = carried(swirled, wind.detail_speed) / f32(clouds.detail_scale)
+    at = carried(swirled, wind.detail_direction, wind.detail_speed) / f32(clouds.detail_scale)
     detail = sample(textures["detail_noise"], DETAIL_SIZE, at)[:, :3] @ FBM
     density = eroded(shape, detail, height, f32(clouds.detail))
     return np.where((height > 0) & (height < 1), density, 0) * f32(clouds.extinction)

@@ -182,6 +182,7 @@ def test_the_wind_comes_round(data, turns, exponent):
     period = 2.0 ** data.draw(st.integers(9, 15))
     speed = 2.0 ** data.draw(st.integers(-4, 9)) * data.draw(st.sampled_from([1, -1]))
     drift = {"wind.speed": speed, "wind.detail_speed": speed, "wind.weather_speed": -speed}
+    drift["wind.detail_direction"] = 180.0
     params = Params().with_(
         **drift,
         **{

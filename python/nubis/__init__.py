@@ -30,6 +30,7 @@ from nubis.params import (
     Params,
     Quality,
     Sun,
+    Wander,
     Weather,
     Wind,
 )
@@ -54,6 +55,7 @@ __all__ = [
     "Quality",
     "Renderer",
     "Sun",
+    "Wander",
     "Weather",
     "Wind",
     "adapters",

@@ -39,6 +39,16 @@ fn weather_from_map(texel: vec3f) -> LocalWeather {
     return LocalWeather(max(shifted, wet), mix(kind, 1.0, rain), rain);
 }
 
+// No cover over the spot to keep clear, and its full share from half a radius outside.
+fn kept_clear(weather: LocalWeather, p: vec2f) -> LocalWeather {
+    if !KEEP_CLEAR {
+        return weather;
+    }
+    let radius = params.weather.clear_radius;
+    let share = smoothstep(radius, 1.5 * radius, length(p - frame.clear_at));
+    return LocalWeather(share * weather.coverage, weather.kind, weather.precipitation);
+}
+
 // Where the profile of a type rises and falls: the weighted sum of three.
 fn profile_edges(kind: f32) -> vec4f {
     let stratus = saturate(1.0 - 2.0 * kind);
@@ -79,7 +89,7 @@ fn cloud_column(p: vec3f, altitude: f32) -> Column {
     let height = (altitude - params.clouds.base) / (params.clouds.top - params.clouds.base);
     let at = p.xy - height * params.wind.shear * frame.wind_direction;
     let uv = frame.weather_origin + vec2f(at.x, -at.y) / params.weather.extent;
-    let weather = weather_from_map(textureSampleLevel(weather_map, repeat_sampler, uv, 0.0).rgb);
+    let weather = kept_clear(weather_from_map(textureSampleLevel(weather_map, repeat_sampler, uv, 0.0).rgb), p.xy);
     let profile = height_profile(height, weather.kind);
     // The noise is at most 1: where the profile alone does not rise above 1 - coverage, nothing does.
     let inside = height > 0.0 && height < 1.0;

@@ -84,9 +84,11 @@ fn finest_feature() -> f32 {
     return min(min(params.clouds.shape_scale / 128.0, params.clouds.detail_scale / 32.0), profile);
 }
 
-// The longest panel that sees what no level of detail smooths: the profile by height, and a texel of the weather map.
+// The longest panel that sees what no level of detail smooths: the profile by height, a texel of the weather map, and the
+// rim of the spot that is kept clear.
 fn coarsest_panel() -> f32 {
     let thickness = params.clouds.top - params.clouds.base;
     let texel = params.weather.extent / f32(textureDimensions(weather_map).x);
-    return max(min(thickness / 16.0, 2.0 * texel), 2.0 * finest_feature());
+    let rim = select(1e30, 0.5 * params.weather.clear_radius, KEEP_CLEAR);
+    return max(min(min(thickness / 16.0, 2.0 * texel), rim), 2.0 * finest_feature());
 }

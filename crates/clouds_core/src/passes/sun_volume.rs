@@ -5,8 +5,9 @@ use glam::{DVec2, DVec3};
 use super::{Baked, Bindings, Context};
 use crate::camera::Camera;
 use crate::error::Result;
-use crate::frame::{Frame, drift};
+use crate::frame::Frame;
 use crate::params::{self, Params};
+use crate::wind::{Carried, fastest};
 
 /// Cells of a level, and levels (as in sun_volume.wgsl).
 const SIZE: [u32; 3] = [96, 96, 6 * 24];
@@ -15,7 +16,7 @@ const EYE_STEP: f64 = 600.0;
 const CLOUD_STEP: f64 = 25.0;
 
 /// What the light is made from: whether it is wanted, sun, clouds, weather, wind and planet, and from where and when.
-type Key = (bool, [f32; 2], params::Clouds, params::Weather, params::Wind, f32, [i64; 3]);
+type Key = (bool, [f32; 2], params::Clouds, params::Weather, (params::Wind, params::Wander), f32, [i64; 3]);
 
 /// The levels on the GPU.
 pub(crate) struct SunVolume {
@@ -31,9 +32,7 @@ struct Origin {
 
 impl Origin {
     fn new(eye: DVec3, params: &Params, time: f64) -> Self {
-        let wind = &params.wind;
-        let fastest = [wind.speed, wind.weather_speed, wind.updraft].map(f32::abs).into_iter().fold(0.1, f32::max);
-        let period = CLOUD_STEP / f64::from(fastest);
+        let period = CLOUD_STEP / fastest(params).max(0.1);
         let place = (eye.truncate() / EYE_STEP).round();
         let steps = [place.x as i64, place.y as i64, (time / period).floor() as i64];
         Self { steps, place: EYE_STEP * place, time: period * (time / period).floor() }
@@ -43,7 +42,8 @@ impl Origin {
 /// Where the eye is in the volume of its picture.
 pub(crate) fn eye_in(eye: DVec3, params: &Params, time: f64) -> [f32; 2] {
     let origin = Origin::new(eye, params, time);
-    (eye.truncate() - origin.place - drift(params, time - origin.time).truncate()).as_vec2().to_array()
+    let drift = Carried::new(params, origin.time, time).drift();
+    (eye.truncate() - origin.place - drift.truncate()).as_vec2().to_array()
 }
 
 impl SunVolume {
@@ -64,7 +64,8 @@ impl SunVolume {
         let origin = Origin::new(eye, params, time);
         let sun = [params.sun.elevation, params.sun.azimuth];
         let radius = params.atmosphere.planet_radius;
-        let (clouds, weather, wind) = (params.clouds.clone(), params.weather.clone(), params.wind.clone());
+        let (clouds, weather) = (params.clouds.clone(), params.weather.clone());
+        let wind = (params.wind.clone(), params.wander.clone());
         let key = (wanted, sun, clouds, weather, wind, radius, origin.steps);
         let view = self.made.get(key, || {
             let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());

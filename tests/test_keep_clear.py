@@ -10,7 +10,7 @@ from nubis.testing import probe
 
 SPOT, RADIUS = (3000.0, -2000.0), 4000.0
 CLOUDY = nubis.Params().with_(
-    **{"clouds.coverage": 0.7, "clouds.extinction": 0.05, "high_clouds.coverage": 0.0}
+    **{"clouds.coverage": 0.85, "clouds.extinction": 0.05, "high_clouds.coverage": 0.0}
 )
 CLEAR = CLOUDY.with_(**{"weather.clear_at": SPOT, "weather.clear_radius": RADIUS})
 

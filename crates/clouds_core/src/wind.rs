@@ -216,7 +216,7 @@ mod tests {
         let mean = covers.iter().map(|c| f64::from(*c)).sum::<f64>() / covers.len() as f64;
         assert!((mean - 0.45).abs() < 0.005, "{mean}");
         let (least, most) = covers.iter().fold((1f32, 0f32), |(a, b), &c| (a.min(c), b.max(c)));
-        assert!(least >= 0.15 && least < 0.2 && most <= 0.75 && most > 0.7, "{least} {most}");
+        assert!((0.15..0.2).contains(&least) && (0.7..=0.75).contains(&most), "{least} {most}");
         for second in 0..20_000 {
             // In a second by less than the fastest turn, 0.3 x 2 pi / 4770 s, and a step.
             let [a, b] = [0.0, 1.0].map(|dt| params.at(f64::from(second) + dt).clouds.coverage);

@@ -283,42 +283,54 @@ def test_what_does_not_wander_stays(renderer):
 
 
 def test_an_animation_of_a_wandering_wind_stays_near_the_still(renderer):
-    """The reprojection follows the wandering wind: no farther from the still than in a steady one,
-    and nearer than where the clouds are followed as if it were steady.
+    """The reprojection follows the wind as it wanders. In a lull, where a gale of 100 m/s all but
+    stands still, the error is 0.22, which is what this size has of neighbours four pixels apart;
+    where the clouds are looked for as if it blew, 0.38.
     """
-    storm = {"wind.speed": 60.0, "wind.detail_speed": 60.0, "wind.weather_speed": 60.0}
-    params = nubis.Params().with_(**storm, **{"high_clouds.coverage": 0.0, "wind.updraft": 0.0})
-    camera = nubis.Camera.look_at((0, 0, 300), (0, 1000, 500))
-    make, other = renderer(96, 54), nubis.Renderer(96, 54, quality="draft")
-
-    def error(**wander):
-        sky = params.with_(**{f"wander.{name}": value for name, value in wander.items()})
-        shots = [(camera, sky, 1000.0 + 0.5 * i) for i in range(24)]
-        *_, last = make.animate(shots)
-        still = other.render(camera, sky, time=shots[-1][2])
-        assert np.isfinite(last).all()
-        assert last.mean() == pytest.approx(still.mean(), rel=0.1)
-        return twin.relative_rmse(last[..., :3], still[..., :3])
-
-    steady, wandering = error(), error(wind=1.0, coverage=0.3, period=600.0)
-    assert wandering < 0.4
-    assert wandering < 1.5 * steady
-
-
-def test_shadows_drift_with_a_wandering_wind():
-    """Between two bakes the sun volume is read where the wind has carried it from."""
-    quality = nubis.quality("balanced").replace(contrast=0.0, sun_volume=True, light_steps=3)
+    gale = {f"wind.{kind}speed": 100.0 for kind in ("", "detail_", "weather_")}
     params = nubis.Params().with_(
-        **{
-            "wind.speed": 20.0,
-            "wind.weather_speed": 20.0,
-            "wind.updraft": 0.0,
-            "wander.wind": 1.0,
-            "wander.period": 600.0,
-        }
+        **gale,
+        **{"wind.updraft": 0.0, "high_clouds.coverage": 0.0, "wander.wind": 1.0},
     )
-    make = nubis.Renderer(32, 18, quality=quality)
-    camera = nubis.Camera.look_at((0, 0, 200), (0, 5000, 1500), (0, 0, 1), 60.0)
-    # 25 m / 40 m/s, the most that the wind may blow: a bake every 0.625 s.
-    late, baked = (make.render(camera, params, time=1000 * 0.625 + dt) for dt in (0.624, 0.6251))
-    assert np.abs(late - baked).mean() < 0.01 * baked.mean()
+    rate, phase = noise_twin.turns(params.wander, 0)
+    times = np.arange(0, 500_000, 60.0)
+    speeds = np.abs(1 + np.exp(1j * (rate * times[:, None] + phase)).mean(axis=1))
+    assert speeds.min() < 0.2
+    camera, make = nubis.Camera.look_at((0, 0, 300), (0, 1000, 500)), renderer(96, 54)
+    shots = [(camera, params, times[np.argmin(speeds)] + 0.5 * i) for i in range(32)]
+    *_, last = make.animate(shots)
+    still = make.render(camera, params, time=shots[-1][2])
+    assert np.isfinite(last).all()
+    assert last.mean() == pytest.approx(still.mean(), rel=0.1)
+    assert twin.relative_rmse(last[..., :3], still[..., :3]) < 0.3
+
+
+@pytest.mark.parametrize("wander", [{}, {"wander.wind": 1.0}], ids=["steady", "wandering"])
+def test_shadows_drift_with_the_wind(wander):
+    """The sun volume is baked every 25 m of the fastest that the wind may blow, and read where it
+    has drifted to since: half way between the weather and the shapes.
+    """
+    params = nubis.Params().with_(
+        **wander,
+        **{"wind.direction": 90.0, "wind.speed": 20.0, "wander.period": 600.0},
+    )
+
+    def drift(time):
+        wind = params.wind
+        shape = noise_twin.blown(params, wind.direction, wind.speed, time)
+        return 0.5 * (
+            shape + noise_twin.blown(params, wind.weather_direction, wind.weather_speed, time)
+        )
+
+    period = 25.0 / (20.0 * (1.0 + params.wander.wind))
+    for time in (0.0, 0.6, 333.3, 5000.1, MONTH + 0.4):
+        baked = np.floor(time / period) * period
+        got = probe(
+            "vec4f(frame.sun_volume_eye, 0.0, 0.0)",
+            [0.0],
+            imports=["bindings"],
+            params=params,
+            time=time,
+        )[0, :2]
+        np.testing.assert_allclose(got, drift(baked) - drift(time), atol=1e-5)
+        assert np.linalg.norm(got) <= 25.0

@@ -55,8 +55,9 @@ build: generate $(VENV)/ready ## Make .venv with nubis in it
 render: build ## Render every scene into out/
 	$(BIN)/python -m nubis render --all --out out
 
-gallery: build ## Render the pictures of the README into docs/images
+gallery: build ## Render the pictures of the README and of docs/clouds.md into docs/images
 	$(BIN)/python -m nubis render --all --size 640x360 --out docs/images
+	$(BIN)/python -m docs.gallery
 
 test: types ## Run all tests; needs no GPU
 	cargo test --release

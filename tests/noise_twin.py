@@ -386,6 +386,56 @@ def bakes(params):
     }
 
 
+def turns(wander, channel):
+    """Angular velocities (1/s) and phases of the four turns of a wander; 0 is the wind, 1 the
+    cover.
+    """
+    k = np.arange(4)
+    period = f32(wander.period) * 3 ** ((k - 1.5) / 4)
+    keys = np.stack([np.full(4, wander.seed), k, np.full(4, channel)], axis=-1)
+    phase = 2 * np.pi * pcg3d(keys)[..., 0] / 2**32
+    return (-1.0) ** k * 2 * np.pi / period, phase
+
+
+def blown(params, degrees, speed, time):
+    """Where a wind has carried what it carries, m (east, north): the integral of its velocity from
+    0 to `time`, by Gauss-Legendre quadrature on pieces of an eighth of the shortest period, which
+    is exact to 1e-15.
+
+    The velocity is the mean one, stretched and turned by 1 + share * (mean of four unit vectors
+    that turn), in complex numbers.
+    """
+    rate, phase = turns(params.wander, 0)
+    pieces = int(np.ceil(abs(time) * np.abs(rate).max() / 2 / np.pi * 8)) + 1
+    ends = np.linspace(0, time, pieces + 1)
+    nodes, weights = np.polynomial.legendre.leggauss(12)
+    half = 0.5 * np.diff(ends)[:, None]
+    at = 0.5 * (ends[:-1, None] + ends[1:, None]) + half * nodes
+    gust = np.exp(1j * (rate * at[..., None] + phase)).mean(axis=-1)
+    seconds = time + f32(params.wander.wind) * (half * weights * gust).sum()
+    east, north, _ = twin.compass(float(f32(degrees))) * f32(speed)
+    way = (east + 1j * north) * seconds
+    return np.array([way.real, way.imag])
+
+
+def cover(params, time):
+    """The mean cover, and what wanders, in steps of a 1024th."""
+    rate, phase = turns(params.wander, 1)
+    swing = np.round(np.sin(rate * time + phase).mean() * 1024) / 1024
+    return float(np.clip(f32(params.clouds.coverage) + f32(params.wander.coverage) * swing, 0, 1))
+
+
+def kept_clear(points, weather):
+    """The share of the cover that is left: none within the radius, all of it from half a radius
+    outside.
+    """
+    radius = float(f32(weather.clear_radius))
+    if radius == 0:
+        return 1.0
+    away = np.linalg.norm(points[:, :2] - f32(weather.clear_at), axis=1)
+    return smoothstep(radius, 1.5 * radius, away)
+
+
 class Field:
     """The whole sampler of nubis2015 at world points at a time, with what has been added to it.
 
@@ -393,7 +443,8 @@ class Field:
     """
 
     def __init__(self, params, time, textures):
-        self.params, self.time, self.textures = params, time, textures
+        self.params = params.with_(**{"clouds.coverage": cover(params, time)})
+        self.time, self.textures = time, textures
 
     def extinction(self, points):
         """In 1/m."""
@@ -418,7 +469,7 @@ class Field:
         downwind = twin.compass(float(f32(wind.direction)))[:2]
         return points[:, :2] - f32(wind.shear) * height[:, None] * downwind
 
-    def texel(self, on_map, points, drift):
+    def texel(self, on_map, upright, drift):
         """Of the weather map. Column 0 is the west, row 0 the north."""
         weather = self.params.weather
         down = np.array([1, -1])
@@ -427,7 +478,7 @@ class Field:
         if weather.broad_variety == 0 or (weather.map is not None and weather.broad_map is None):
             return sample(self.textures["weather_map"], size, at)[:, :3]
         own = weather.broad_map
-        broad_at = 0.5 + (points[:, :2] - drift) / f32(weather.broad_extent) * down
+        broad_at = 0.5 + (upright - drift) / f32(weather.broad_extent) * down
         broad_size = BROAD_SIZE if own is None else own.shape[1::-1]
         shift = sample(self.textures["broad_map"], broad_size, broad_at)
         if own is None:
@@ -437,12 +488,16 @@ class Field:
 
     def weather(self, points, altitude):
         """Where the weather is read, and what it says: coverage, type, precipitation."""
-        wind = self.params.wind
-        direction = twin.compass(float(f32(wind.weather_direction)))[:2]
-        drift = self.time * f32(wind.weather_speed) * direction
+        drift = self.weather_drift()
         upright = self.leant(points, altitude)
         on_map = (upright - drift) / f32(self.params.weather.extent)
-        return upright, weather_from_map(self.texel(on_map, points, drift), self.params.clouds)
+        texel = self.texel(on_map, upright, drift)
+        coverage, kind, rain = weather_from_map(texel, self.params.clouds)
+        return upright, (coverage * kept_clear(points, self.params.weather), kind, rain)
+
+    def weather_drift(self):
+        wind = self.params.wind
+        return blown(self.params, wind.weather_direction, wind.weather_speed, self.time)
 
     def lower(self, points, altitude):
         clouds = self.params.clouds
@@ -461,10 +516,8 @@ class Field:
             profile, coverage = np.maximum(profile, anvil), np.maximum(coverage, anvil)
             height = np.minimum(height, 1)
         wind = self.params.wind
-        speeds = f32(wind.speed), f32(wind.detail_speed)
-        density = self.cloud(
-            upright, altitude, height, profile, coverage, wind.direction, speeds, 1.0
-        )
+        winds = (wind.direction, wind.speed), (wind.detail_direction, wind.detail_speed)
+        density = self.cloud(upright, altitude, height, profile, coverage, winds, 1.0)
         return with_coverage(profile, coverage), density
 
     def upper(self, points, altitude):
@@ -474,20 +527,19 @@ class Field:
         height = (altitude - base) / (f32(deck.top) - base)
         downwind = twin.compass(float(f32(deck.direction)))[:2]
         upright = points[:, :2] - f32(deck.shear) * height[:, None] * downwind
-        speed = f32(deck.speed)
         extent = f32(self.params.weather.extent) * scale
-        on_map = (upright - self.time * speed * downwind) / extent + (0.37 - 0.5, 0.61 + 0.5)
-        direction = twin.compass(float(f32(wind.weather_direction)))[:2]
-        texel = self.texel(on_map, points, self.time * f32(wind.weather_speed) * direction)
+        drift = blown(self.params, deck.direction, deck.speed, self.time)
+        on_map = (upright - drift) / extent + (0.37 - 0.5, 0.61 + 0.5)
+        texel = self.texel(on_map, self.leant(points, altitude), self.weather_drift())
         coverage = np.clip(texel[:, 0] + 2 * f32(deck.coverage) - 1, 0, 1)
+        coverage = coverage * kept_clear(points, self.params.weather)
         kind = np.clip(texel[:, 1] + 2 * f32(deck.type) - 1, 0, 1)
         profile = np.where(
             (height > 0) & (height < 1), height_profile(height, kind, self.params.clouds), 0
         )
-        speeds = speed, speed + f32(wind.detail_speed) - f32(wind.speed)
-        density = self.cloud(
-            upright, altitude, height, profile, coverage, deck.direction, speeds, scale
-        )
+        faster = f32(f32(deck.speed) + f32(wind.detail_speed) - f32(wind.speed))
+        winds = (deck.direction, deck.speed), (deck.direction, faster)
+        density = self.cloud(upright, altitude, height, profile, coverage, winds, scale)
         return with_coverage(profile, coverage), density
 
     def rain(self, points, altitude):
@@ -496,24 +548,24 @@ class Field:
         upright, (coverage, _, rain) = self.weather(points, altitude)
         share = altitude / f32(clouds.base)
         limit = np.where(altitude > 0, np.clip(2 * rain * coverage - 0.6 + 0.6 * share, 0, 1), 0)
-        at = self.carried(upright, altitude / 12, wind.direction, f32(wind.speed))
+        at = self.carried(upright, altitude / 12, (wind.direction, wind.speed))
         noise = sample(self.textures["shape_noise"], SHAPE_SIZE, at / f32(clouds.shape_scale))
         return limit, limit * np.clip(twin.remap(base_shape(noise), 0.15, 0.65), 0, 1)
 
-    def carried(self, at, altitude, direction, speed, scale=1.0):
+    def carried(self, at, altitude, wind, scale=1.0):
         """Where the wind has brought here what was baked."""
-        at = at - self.time * speed * twin.compass(float(f32(direction)))[:2]
+        at = at - blown(self.params, *wind, self.time)
         rise = self.time * f32(self.params.wind.updraft)
         return np.column_stack([at / scale, altitude / scale - rise / scale])
 
-    def cloud(self, upright, altitude, height, profile, coverage, direction, speeds, scale):
+    def cloud(self, upright, altitude, height, profile, coverage, winds, scale):
         clouds = self.params.clouds
-        at = self.carried(upright, altitude, direction, speeds[0], scale) / f32(clouds.shape_scale)
+        at = self.carried(upright, altitude, winds[0], scale) / f32(clouds.shape_scale)
         noise = sample(self.textures["shape_noise"], SHAPE_SIZE, at)
         shape = with_coverage(base_shape(noise) * profile, coverage)
         shape = np.where(with_coverage(profile, coverage) > 0, shape, 0)
 
-        moved = self.carried(upright, altitude, direction, speeds[1], scale)
+        moved = self.carried(upright, altitude, winds[1], scale)
         at = moved[:, :2] / f32(clouds.curl_scale)
         swirl = sample(self.textures["curl_noise"], CURL_SIZE, at)[:, :2]
         moved[:, :2] += f32(clouds.curl) * (1 - height[:, None]) * swirl

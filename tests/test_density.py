@@ -246,7 +246,7 @@ def test_extinction_scales_the_field(renderer, rng):
 
 
 def wind_params(direction, speed, **changes):
-    names = ["wind.direction", "wind.weather_direction"]
+    names = ["wind.direction", "wind.detail_direction", "wind.weather_direction"]
     speeds = ["wind.speed", "wind.detail_speed", "wind.weather_speed"]
     values = dict.fromkeys(names, direction) | dict.fromkeys(speeds, speed) | {"wind.updraft": 0.0}
     return nubis.Params().with_(**{"clouds.coverage": 0.6, **values, **changes})

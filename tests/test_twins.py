@@ -213,11 +213,18 @@ def any_sky(rng, params):
             "weather.seed": int(rng.integers(2**32)),
             "wind.direction": rng.uniform(-360, 360),
             "wind.speed": rng.uniform(-30, 30),
+            "wind.detail_direction": rng.uniform(-360, 360),
             "wind.detail_speed": rng.uniform(-30, 30),
             "wind.shear": rng.uniform(-2000, 2000),
             "wind.updraft": rng.uniform(-3, 3),
             "wind.weather_direction": rng.uniform(-360, 360),
             "wind.weather_speed": rng.uniform(-30, 30),
+            "wander.wind": rng.uniform(0, 1),
+            "wander.coverage": rng.uniform(0, 0.2),
+            "wander.period": log_uniform(600, 30_000),
+            "wander.seed": int(rng.integers(2**32)),
+            "weather.clear_at": tuple(rng.uniform(-60_000, 60_000, 2)),
+            "weather.clear_radius": log_uniform(3000, 30_000),
             "atmosphere.planet_radius": log_uniform(400_000, 6_371_000),
             # Not part of the field, and dear to bake for every time.
             "high_clouds.coverage": 0.0,
@@ -304,6 +311,9 @@ def test_extinction(renderer, noise_params, seed, time, kind):
     params = any_sky(rng, noise_params)
     params = params.with_(**added(rng, kind))
     points, heights = points_about_the_shell(rng, params, 1000)
+    # The twin follows each swing: ten thousand at most.
+    period = max(params.wander.period, abs(time) / 1e4)
+    params = params.with_(**{"wander.period": period})
     deck = params.upper_clouds
     largest = max(
         params.clouds.extinction,

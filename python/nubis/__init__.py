@@ -19,6 +19,7 @@ from nubis._errors import (
     ParameterError,
 )
 from nubis._image import save, to_srgb8
+from nubis._levels import presets, sky
 from nubis._nubis import Camera, DensityGrid
 from nubis._renderer import Adapter, Renderer, adapters, quality
 from nubis._scenes import scenes
@@ -31,6 +32,7 @@ from nubis.params import (
     Quality,
     Sun,
     UpperClouds,
+    Wander,
     Weather,
     Wind,
 )
@@ -56,11 +58,14 @@ __all__ = [
     "Renderer",
     "Sun",
     "UpperClouds",
+    "Wander",
     "Weather",
     "Wind",
     "adapters",
+    "presets",
     "quality",
     "save",
     "scenes",
+    "sky",
     "to_srgb8",
 ]

@@ -22,6 +22,7 @@ examples:
   python -m nubis render sunset
   python -m nubis render --all --size 320x180 --quality draft
   python -m nubis render storm --out storm.exr --time 60 --adapter cpu
+  python -m nubis render sunset --preset storm --cover 0.4
   python -m nubis render fair_weather --params my_sky.toml --exposure 0.5
   python -m nubis render in_cloud --heat
 """
@@ -80,8 +81,17 @@ def _parser() -> argparse.ArgumentParser:
     render.add_argument(
         "--exposure", type=float, default=0.0, metavar="E", help="stops, for png (default: 0)"
     )
-    render.add_argument(
+    clouds = render.add_mutually_exclusive_group()
+    clouds.add_argument(
         "--params", type=Path, metavar="FILE", help="TOML file of a sky in place of the scenes' own"
+    )
+    clouds.add_argument(
+        "--preset",
+        metavar="NAME",
+        help="clouds in place of the scenes' own, under their sun: see `python -m nubis presets`",
+    )
+    render.add_argument(
+        "--cover", type=float, metavar="C", help="how much cloud, from 0, clear, to 1, overcast"
     )
     render.add_argument(
         "--heat",
@@ -102,6 +112,7 @@ def _parser() -> argparse.ArgumentParser:
 
     for run, name, about in [
         (_scenes, "scenes", "list the scenes"),
+        (_presets, "presets", "list the presets"),
         (_adapters, "adapters", "list the adapters, best first"),
         (_info, "info", "print versions and adapters, and try a small render"),
     ]:
@@ -119,26 +130,35 @@ def _size(text: str) -> tuple[int, int]:
 
 def _render(args: argparse.Namespace) -> None:
     targets = _targets(args)
-    sky = nubis.Params.load(args.params) if args.params else None
+    skies = {name: _sky(args, nubis.scenes[name][1]) for name, _ in targets}
     renderer = nubis.Renderer(*args.size, quality=args.quality, adapter=args.adapter)
     print(_line(renderer.adapter), flush=True)
     width, height = renderer.size
     with _progress(targets) as bar:
         say = getattr(bar, "write", print)
         for name, path in bar:
-            camera, params = nubis.scenes[name]
+            camera, params = nubis.scenes[name][0], skies[name]
             started = perf_counter()
-            frame = renderer.render(camera, sky or params, time=args.time)
+            frame = renderer.render(camera, params, time=args.time)
             milliseconds = 1000 * (perf_counter() - started)
             path.parent.mkdir(parents=True, exist_ok=True)
             nubis.save(path, frame, exposure=args.exposure)
             say(f"{path}: {renderer.adapter.name}, {width}x{height}, {milliseconds:.0f} ms")
             if args.heat:
-                layers = renderer.render_layers(camera, sky or params, time=args.time)
+                layers = renderer.render_layers(camera, params, time=args.time)
                 beside = path.with_suffix(".heat.png")
                 _nubis.write_png(beside, _image.heat(layers["samples"]))
                 say(f"{beside}: {layers['samples'].mean():.1f} density evaluations a pixel")
             sys.stdout.flush()
+
+
+def _sky(args: argparse.Namespace, params: nubis.Params) -> nubis.Params:
+    """The sky of a scene, or what is asked for in its place."""
+    if args.params:
+        params = nubis.Params.load(args.params)
+    elif args.preset is not None:
+        params = nubis.sky(preset=args.preset).replace(sun=params.sun)
+    return params if args.cover is None else params.with_(**{"clouds.coverage": args.cover})
 
 
 def _targets(args: argparse.Namespace) -> list[tuple[str, Path]]:
@@ -179,6 +199,10 @@ def _line(adapter: nubis.Adapter) -> str:
 
 def _scenes(_: argparse.Namespace) -> None:
     print("\n".join(nubis.scenes))
+
+
+def _presets(_: argparse.Namespace) -> None:
+    print("\n".join(nubis.presets))
 
 
 def _adapters(_: argparse.Namespace) -> None:

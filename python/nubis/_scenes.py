@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
+from nubis._levels import presets
 from nubis._nubis import Camera
 from nubis.params import Params
 
@@ -30,24 +31,15 @@ def _make() -> dict[str, tuple[Camera, Params]]:
         "fair_weather": (_look((0, 0, 200), 0, 14), fair),
         "overcast": (
             _look((0, 0, 200), 20, 16),
-            fair.with_(**{"clouds.coverage": 0.9, "clouds.type": 0.35, "sun.elevation": 35.0}),
+            presets["overcast"].with_(**{"sun.elevation": 35.0}),
         ),
         "stratocumulus": (
             _look((0, 0, 200), 340, 16),
-            fair.with_(**{"clouds.coverage": 0.62, "clouds.type": 0.5, "sun.elevation": 30.0}),
+            presets["stratocumulus"].with_(**{"sun.elevation": 30.0}),
         ),
         "storm": (
             _look((0, 0, 200), 40, 14),
-            fair.with_(
-                **{
-                    "clouds.coverage": 0.6,
-                    "clouds.precipitation": 0.9,
-                    "clouds.base": 900.0,
-                    "clouds.top": 5500.0,
-                    "sun.elevation": 28.0,
-                    "sun.azimuth": 140.0,
-                }
-            ),
+            presets["storm"].with_(**{"sun.elevation": 28.0, "sun.azimuth": 140.0}),
         ),
         "sunset": (
             _look((0, 0, 200), 250, 11),
@@ -63,7 +55,7 @@ def _make() -> dict[str, tuple[Camera, Params]]:
         ),
         "cirrus": (
             _look((0, 0, 200), 300, 25),
-            fair.with_(**{"clouds.coverage": 0.25, "high_clouds.coverage": 0.6}),
+            presets["cirrus"],
         ),
         "mackerel": (
             _look((0, 0, 200), 330, 24),

@@ -191,6 +191,12 @@ class Weather(Block):
     broad_map : array of float32, shape (H, W, 3), or None
         A larger map of your own: shifts of coverage, type and precipitation, 0.5 is none. Allowed:
         None or a float array of shape (H, W, 3), H and W from 1 to 8192, values from 0 to 1.
+    clear_at : tuple[float, float]
+        Middle of the spot to keep clear, east and north of the origin. It stays while the weather
+        drifts over it. Allowed: 2 numbers from -10000000 to 10000000 m.
+    clear_radius : float
+        Radius in which the spot has no cloud; the cover is back half a radius farther out. 0 keeps
+        nothing clear. Allowed: a number from 0 to 10000000 m.
     """
 
     extent: float = 60000.0
@@ -201,6 +207,8 @@ class Weather(Block):
     broad_variety: float = 0.3
     broad_extent: float = 430000.0
     broad_map: npt.NDArray[np.float32] | None = None
+    clear_at: tuple[float, float] = (0.0, 0.0)
+    clear_radius: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -210,13 +218,16 @@ class Wind(Block):
     Attributes
     ----------
     direction : float
-        Compass direction toward which the wind blows, clockwise from north. Allowed: a number from
-        -360 to 360 degrees.
+        Compass direction toward which the base shapes drift and the tops lean, clockwise from
+        north. Allowed: a number from -360 to 360 degrees.
     speed : float
         Speed of the base shapes. Allowed: a number from -1000 to 1000 m/s.
+    detail_direction : float
+        Compass direction toward which the detail drifts. Allowed: a number from -360 to 360
+        degrees.
     detail_speed : float
-        Speed of the detail; the difference to `speed` makes the edges boil. Allowed: a number from
-        -1000 to 1000 m/s.
+        Speed of the detail; the difference to the base shapes makes the edges boil. Allowed: a
+        number from -1000 to 1000 m/s.
     shear : float
         How far the tops lean downwind (nubis2015: 500 m). Allowed: a number from -20000 to 20000 m.
     updraft : float
@@ -231,11 +242,38 @@ class Wind(Block):
 
     direction: float = 60.0
     speed: float = 8.0
+    detail_direction: float = 60.0
     detail_speed: float = 11.0
     shear: float = 400.0
     updraft: float = 0.8
     weather_direction: float = 60.0
     weather_speed: float = 8.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Wander(Block):
+    """Winds and cover that wander over hours (gems2001): four slow turns of unlike periods, in
+    closed form, so that any time can be asked for.
+
+    Attributes
+    ----------
+    wind : float
+        By how much the winds wander, as a share of their speed, in speed and direction: at 0.5 a
+        wind blows at a half to one and a half times its speed, within 30 degrees of its direction.
+        All winds wander alike; what leans keeps leaning as it does. Allowed: a number from 0 to 1.
+    coverage : float
+        By how much `clouds.coverage` wanders up and down, within 0 to 1. Allowed: a number from 0
+        to 1.
+    period : float
+        How long a swing takes, about. Allowed: a number from 60 to 100000000 s.
+    seed : int
+        Which random swings. Allowed: a whole number from 0 to 4294967295.
+    """
+
+    wind: float = 0.0
+    coverage: float = 0.0
+    period: float = 7200.0
+    seed: int = 11
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -498,6 +536,9 @@ class Params(Root):
         The weather map: where the clouds stand.
     wind : Wind
         What moves the clouds.
+    wander : Wander
+        Winds and cover that wander over hours (gems2001): four slow turns of unlike periods, in
+        closed form, so that any time can be asked for.
     high_clouds : HighClouds
         The thin high clouds, a layer without thickness on its own sphere (nubis2015; animated as in
         gems2001).
@@ -514,6 +555,7 @@ class Params(Root):
     upper_clouds: UpperClouds = field(default_factory=UpperClouds)
     weather: Weather = field(default_factory=Weather)
     wind: Wind = field(default_factory=Wind)
+    wander: Wander = field(default_factory=Wander)
     high_clouds: HighClouds = field(default_factory=HighClouds)
     light: Light = field(default_factory=Light)
     atmosphere: Atmosphere = field(default_factory=Atmosphere)

@@ -5,6 +5,7 @@
 // What a pipeline is made for; the rest is compiled out (crates/clouds_core/src/kernel.rs).
 override MODEL: u32 = 0u; // light.model
 override VOLUME: bool = false; // the clouds are the user's grid, not procedural
+override KEEP_CLEAR: bool = false; // there is a spot without clouds
 override CAMERA: u32 = 0u; // the projection, see camera.wgsl
 override PRECISE: bool = false; // that grid is read by loads and in f32, not filtered by the hardware in half floats
 override SUNLIT: bool = true; // the sun can reach the clouds

@@ -40,6 +40,15 @@ fn weather_from_map(texel: vec3f) -> LocalWeather {
     return LocalWeather(max(shifted, wet), mix(kind, 1.0, rain), rain);
 }
 
+// The share of the cover that is left: none over the spot to keep clear, all from half a radius outside.
+fn kept_clear(place: vec2f) -> f32 {
+    if !KEEP_CLEAR {
+        return 1.0;
+    }
+    let radius = params.weather.clear_radius;
+    return smoothstep(radius, 1.5 * radius, length(place - frame.clear_at));
+}
+
 // Where the profile of a type rises from 0 to 1 and falls back, as fractions of the height: the weighted sum of three
 // (nubis2015, figure 4.10; vsu2022's gradients, equations 8 to 11), and where it rains that of cumulonimbus.
 fn profile_edges(kind: f32, rain: f32) -> vec4f {
@@ -99,8 +108,9 @@ fn cloud_column(p: vec3f, altitude: f32) -> Column {
         return Column(select(0.0, 1.0, in_volume(p)), 1.0, 1.0, height, 0.0, p, CLOUD);
     }
     let at = leant(p.xy, altitude);
-    let broad = broad_weather(p.xy);
-    let weather = weather_from_map(weather_texel(frame.weather_origin, at, broad));
+    let broad = broad_weather(at);
+    var weather = weather_from_map(weather_texel(frame.weather_origin, at, broad));
+    weather.coverage *= kept_clear(p.xy);
     var column = cloud_in(weather, at, altitude);
     if RAIN_SHAFTS && altitude < params.clouds.base {
         column = rain_below(weather, at, altitude);
@@ -122,9 +132,9 @@ fn leant(place: vec2f, altitude: f32) -> vec2f {
 
 // What a larger map shifts the weather by, and, by its green and alpha, bends the smaller map, so that it does not look
 // like its own repetition.
-fn broad_weather(place: vec2f) -> vec4f {
+fn broad_weather(at: vec2f) -> vec4f {
     if BROAD_WEATHER {
-        let uv = frame.broad_origin + vec2f(place.x, -place.y) / params.weather.broad_extent;
+        let uv = frame.broad_origin + vec2f(at.x, -at.y) / params.weather.broad_extent;
         return textureSampleLevel(broad_map, repeat_sampler, uv, 0.0);
     }
     return vec4f(0.0);
@@ -193,7 +203,7 @@ fn upper_cloud_at(p: vec3f, altitude: f32, broad: vec4f) -> Column {
     let lean = height * params.upper_clouds.shear * frame.upper_direction;
     let at = vec3f(p.xy - lean, altitude) / params.upper_clouds.scale;
     let texel = weather_texel(frame.upper_weather_origin, at.xy, broad);
-    let coverage = saturate(texel.r + 2.0 * params.upper_clouds.coverage - 1.0);
+    let coverage = kept_clear(p.xy) * saturate(texel.r + 2.0 * params.upper_clouds.coverage - 1.0);
     let kind = saturate(texel.g + 2.0 * params.upper_clouds.type_ - 1.0);
     let profile = height_profile(height, kind, 0.0);
     let inside = height > 0.0 && height < 1.0;

@@ -22,7 +22,7 @@ fn majorant_at(p: vec3f, altitude: f32) -> Majorant {
         let thickness = frame.shell_top - frame.shell_base;
         let height = (altitude - frame.shell_base) / thickness;
         let at = leant(p.xy, altitude);
-        let uv = weather_uv(frame.weather_origin, at, broad_weather(p.xy));
+        let uv = weather_uv(frame.weather_origin, at, broad_weather(at));
         cell = vec3f(uv - floor(uv), height) * size;
         // Going up a metre also goes sideways in the map, by the wind's lean, and across by more where the map is bent.
         let lean = abs(params.wind.shear) / (params.clouds.top - params.clouds.base);

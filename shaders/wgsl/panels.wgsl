@@ -89,8 +89,10 @@ fn thinnest_deck() -> f32 {
     return select(lower, min(lower, params.upper_clouds.top - params.upper_clouds.base), UPPER);
 }
 
-// The longest panel that sees what no level of detail smooths: the profile by height, and a texel of the weather map.
+// The longest panel that sees what no level of detail smooths: the profile by height, a texel of the weather map, and the
+// rim of the spot that is kept clear.
 fn coarsest_panel() -> f32 {
     let texel = select(1.0, params.upper_clouds.scale, UPPER) * params.weather.extent / f32(textureDimensions(weather_map).x);
-    return max(min(thinnest_deck() / 16.0, 2.0 * texel), 2.0 * finest_feature());
+    let rim = select(1e30, 0.5 * params.weather.clear_radius, KEEP_CLEAR);
+    return max(min(min(thinnest_deck() / 16.0, 2.0 * texel), rim), 2.0 * finest_feature());
 }

@@ -9,6 +9,7 @@ use crate::camera::{Camera, Projection};
 use crate::params;
 use crate::params::Params;
 use crate::passes::{broad_weather, sun_volume};
+use crate::wind::Carried;
 
 params! {
     /// What the renderer knows about a frame.
@@ -139,6 +140,8 @@ params! {
 
         /// Unit vector toward the sun.
         sun_direction: [f32; 3] = [0.0, 0.0, 1.0];
+        /// The middle of the spot to keep clear, relative to the eye, m.
+        clear_at: [f32; 2] = [0.0, 0.0];
         /// Unit vector toward which the wind blows.
         wind_direction: [f32; 2] = [0.0, 1.0];
         /// Where the eye stands in the base shape's tile, after the wind, with the z of altitude 0.
@@ -203,7 +206,7 @@ pub fn sun_direction(params: &Params) -> DVec3 {
 }
 
 /// The unit vector toward a compass direction in degrees, clockwise from north.
-fn compass(degrees: f64) -> DVec2 {
+pub(crate) fn compass(degrees: f64) -> DVec2 {
     // Quarter turns are exact, so that a wind to the east does not blow north by 1e-16 of its way.
     let quarters = (degrees / 90.0).round();
     let (sin, cos) = (degrees - 90.0 * quarters).to_radians().sin_cos();
@@ -220,15 +223,6 @@ fn wrap(v: f64, period: f32) -> f32 {
     let fraction = (v / f64::from(period)).rem_euclid(1.0) as f32;
     // Rounding to f32 may give 1.0, which is 0; and a way too long for f64 has no fraction.
     if fraction < 1.0 { fraction } else { 0.0 }
-}
-
-/// How far the clouds drift in a time, m. What the eye follows is the silhouette: it drifts with the weather, and its
-/// billows with the base shape.
-pub(crate) fn drift(params: &Params, elapsed: f64) -> DVec3 {
-    let wind = &params.wind;
-    let weather = compass(f64::from(wind.weather_direction)) * f64::from(wind.weather_speed);
-    let shape = compass(f64::from(wind.direction)) * f64::from(wind.speed);
-    ((weather + shape) * 0.5).extend(0.5 * f64::from(wind.updraft)) * elapsed
 }
 
 impl Frame {
@@ -331,41 +325,38 @@ impl Frame {
     }
 
     /// The noises and the weather of the upper deck, which are scaled with it.
-    fn set_upper_wind(&mut self, eye: DVec3, params: &Params, time: f64) {
+    fn set_upper_wind(&mut self, eye: DVec3, params: &Params, carried: &Carried) {
         let (clouds, upper) = (&params.clouds, &params.upper_clouds);
         let scale = f64::from(upper.scale);
-        let direction = compass(f64::from(upper.direction));
-        // Its edges boil as those below do.
-        let boil = f64::from(params.wind.detail_speed - params.wind.speed);
-        let rise = -f64::from(params.wind.updraft) * time;
-        let drifted = |faster: f64| (eye.truncate() - direction * (f64::from(upper.speed) + faster) * time) / scale;
-        let plane = |at: DVec2, scale: f32| [wrap(at.x, scale), wrap(at.y, scale)];
-        let volume = |at: DVec2, tile: f32| [wrap(at.x, tile), wrap(at.y, tile), wrap(rise / scale, tile)];
-        self.upper_direction = direction.as_vec2().to_array();
-        self.upper_shape_origin = volume(drifted(0.0), clouds.shape_scale);
-        self.upper_detail_origin = volume(drifted(boil), clouds.detail_scale);
-        self.upper_curl_origin = plane(drifted(boil), clouds.curl_scale);
+        let (shape, detail) = (eye.truncate() - carried.upper, eye.truncate() - carried.upper_detail);
+        let plane = |at: DVec2, tile: f32| [wrap(at.x / scale, tile), wrap(at.y / scale, tile)];
+        let volume = |at: DVec2, tile: f32| {
+            let [x, y] = plane(at, tile);
+            [x, y, wrap(-carried.rise / scale, tile)]
+        };
+        self.upper_direction = compass(f64::from(upper.direction)).as_vec2().to_array();
+        self.upper_shape_origin = volume(shape, clouds.shape_scale);
+        self.upper_detail_origin = volume(detail, clouds.detail_scale);
+        self.upper_curl_origin = plane(detail, clouds.curl_scale);
         // Another part of the map, or one deck would stand on the other.
         let extent = f64::from(params.weather.extent);
-        let weather = drifted(0.0) + DVec2::new(0.37, 0.61) * extent;
+        let weather = shape + DVec2::new(0.37, 0.61) * extent * scale;
         self.upper_weather_origin = plane(DVec2::new(weather.x, -weather.y), params.weather.extent);
     }
 
     fn set_wind(&mut self, eye: DVec3, params: &Params, time: f64) {
         let (clouds, wind, high) = (&params.clouds, &params.wind, &params.high_clouds);
-        let direction = compass(f64::from(wind.direction));
-        let rise = -f64::from(wind.updraft) * time;
-        let drifted = |speed: f32| eye.truncate() - direction * f64::from(speed) * time;
-        let volume = |at: DVec2, scale: f32| [wrap(at.x, scale), wrap(at.y, scale), wrap(rise, scale)];
+        let carried = Carried::new(params, 0.0, time);
+        let volume = |at: DVec2, scale: f32| [wrap(at.x, scale), wrap(at.y, scale), wrap(-carried.rise, scale)];
         let plane = |at: DVec2, scale: f32| [wrap(at.x, scale), wrap(at.y, scale)];
-        self.wind_direction = direction.as_vec2().to_array();
-        self.shape_origin = volume(drifted(wind.speed), clouds.shape_scale);
-        self.detail_origin = volume(drifted(wind.detail_speed), clouds.detail_scale);
-        self.curl_origin = plane(drifted(wind.detail_speed), clouds.curl_scale);
+        self.wind_direction = compass(f64::from(wind.direction)).as_vec2().to_array();
+        let (shape, detail) = (eye.truncate() - carried.shape, eye.truncate() - carried.detail);
+        self.shape_origin = volume(shape, clouds.shape_scale);
+        self.detail_origin = volume(detail, clouds.detail_scale);
+        self.curl_origin = plane(detail, clouds.curl_scale);
 
         // The middle of the weather map is the origin of the world, its first row the north.
-        let weather =
-            eye.truncate() - compass(f64::from(wind.weather_direction)) * f64::from(wind.weather_speed) * time;
+        let weather = eye.truncate() - carried.weather;
         let half = 0.5 * f64::from(params.weather.extent);
         self.weather_origin = plane(DVec2::new(weather.x + half, half - weather.y), params.weather.extent);
 
@@ -376,11 +367,14 @@ impl Frame {
             let ways = f64::from(broad_weather::BEND * params.weather.extent / params.weather.broad_extent);
             self.broad_stretch = (ways * broad_weather::STEEPEST) as f32;
         }
-        self.set_upper_wind(eye, params, time);
+        self.set_upper_wind(eye, params, &carried);
+
+        let spot = DVec2::from_array(params.weather.clear_at.map(f64::from));
+        self.clear_at = (spot - eye.truncate()).as_vec2().to_array();
 
         let along = compass(f64::from(high.direction));
         let across = DVec2::new(-along.y, along.x);
-        let at = eye.truncate() - along * f64::from(high.speed) * time;
+        let at = eye.truncate() - carried.high;
         let at = DVec2::new(at.dot(along), at.dot(across));
         self.high_origin = plane(at, high.scale);
         self.high_broad_origin = plane(at, HIGH_BROAD * high.scale);
@@ -404,13 +398,13 @@ impl Frame {
     }
 
     /// Notes what has changed since the frame before, for reprojection.
-    pub fn set_previous(&mut self, previous: &Self, eye_motion: DVec3, params: &Params, elapsed: f64) {
+    pub(crate) fn set_previous(&mut self, previous: &Self, eye_motion: DVec3, carried: &Carried) {
         self.previous_right = previous.right;
         self.previous_up = previous.up;
         self.previous_forward = previous.forward;
         self.previous_tan_half_fov = previous.tan_half_fov;
         self.previous_half_fov = previous.half_fov;
         self.eye_motion = eye_motion.as_vec3().to_array();
-        self.cloud_motion = drift(params, elapsed).as_vec3().to_array();
+        self.cloud_motion = carried.drift().as_vec3().to_array();
     }
 }

@@ -54,6 +54,8 @@ pub(crate) struct Variant {
     pub volume: bool,
     /// Whether that grid is read in f32.
     pub precise: bool,
+    /// Whether there is a spot to keep clear.
+    pub keep_clear: bool,
     /// Whether the sun can reach the clouds.
     pub sunlit: bool,
     /// Whether light is read from the sun volume.
@@ -93,6 +95,7 @@ impl Variant {
         Self {
             model,
             volume: params.volume.is_some(),
+            keep_clear: params.weather.clear_radius > 0.0 && params.volume.is_none(),
             precise: quality.tolerance > 0.0 || model == Model::Path,
             sunlit: true,
             sun_volume: quality.sun_volume && params.volume.is_none(),
@@ -123,11 +126,12 @@ impl Variant {
         Self { sunlit: frame.sunlit(params), camera: frame.camera_kind, ..Self::new(params, quality) }
     }
 
-    fn constants(self) -> [(&'static str, f64); 18] {
+    fn constants(self) -> [(&'static str, f64); 19] {
         let switch = |on| f64::from(u8::from(on));
         [
             ("MODEL", f64::from(self.model as u32)),
             ("VOLUME", switch(self.volume)),
+            ("KEEP_CLEAR", switch(self.keep_clear)),
             ("PRECISE", switch(self.precise)),
             ("SUNLIT", switch(self.sunlit)),
             ("SUN_VOLUME", switch(self.sun_volume)),

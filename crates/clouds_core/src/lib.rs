@@ -19,6 +19,7 @@ pub mod renderer;
 pub mod schema;
 pub mod shader;
 pub mod volume;
+mod wind;
 
 pub use camera::Camera;
 pub use error::{Error, Result};

@@ -152,15 +152,21 @@ params! {
         broad_extent: f32 = 430000.0, in 100..=10000000 "m";
         /// A larger map of your own: shifts of coverage, type and precipitation, 0.5 is none.
         broad_map: Option<Arc<Map>> = None, in 0..=1 "";
+        /// Middle of the spot to keep clear, east and north of the origin. It stays while the weather drifts over it.
+        clear_at: [f32; 2] = [0.0, 0.0], in -10000000..=10000000 "m";
+        /// Radius in which the spot has no cloud; the cover is back half a radius farther out. 0 keeps nothing clear.
+        clear_radius: f32 = 0.0, in 0..=10000000 "m";
     }
 
     /// What moves the clouds.
     Wind {
-        /// Compass direction toward which the wind blows, clockwise from north.
+        /// Compass direction toward which the base shapes drift and the tops lean, clockwise from north.
         direction: f32 = 60.0, in -360..=360 "degrees";
         /// Speed of the base shapes.
         speed: f32 = 8.0, in -1000..=1000 "m/s";
-        /// Speed of the detail; the difference to `speed` makes the edges boil.
+        /// Compass direction toward which the detail drifts.
+        detail_direction: f32 = 60.0, in -360..=360 "degrees";
+        /// Speed of the detail; the difference to the base shapes makes the edges boil.
         detail_speed: f32 = 11.0, in -1000..=1000 "m/s";
         /// How far the tops lean downwind (nubis2015: 500 m).
         shear: f32 = 400.0, in -20000..=20000 "m";
@@ -170,6 +176,21 @@ params! {
         weather_direction: f32 = 60.0, in -360..=360 "degrees";
         /// Speed of the weather map; 0 keeps a composed sky in place while its shapes evolve (thesis2018).
         weather_speed: f32 = 8.0, in -1000..=1000 "m/s";
+    }
+
+    /// Winds and cover that wander over hours (gems2001): four slow turns of unlike periods, in closed form, so that any
+    /// time can be asked for.
+    Wander {
+        /// By how much the winds wander, as a share of their speed, in speed and direction: at 0.5 a wind blows at a half to
+        /// one and a half times its speed, within 30 degrees of its direction. All winds wander alike; what leans keeps
+        /// leaning as it does.
+        wind: f32 = 0.0, in 0..=1 "";
+        /// By how much `clouds.coverage` wanders up and down, within 0 to 1.
+        coverage: f32 = 0.0, in 0..=1 "";
+        /// How long a swing takes, about.
+        period: f32 = 7200.0, in 60..=100000000 "s";
+        /// Which random swings.
+        seed: u32 = 11, in 0..=4294967295.0 "";
     }
 
     /// The thin high clouds, a layer without thickness on its own sphere (nubis2015; animated as in gems2001).
@@ -313,6 +334,7 @@ pub struct Params {
     pub upper_clouds: UpperClouds,
     pub weather: Weather,
     pub wind: Wind,
+    pub wander: Wander,
     pub high_clouds: HighClouds,
     pub light: Light,
     pub atmosphere: Atmosphere,
@@ -322,13 +344,14 @@ pub struct Params {
 
 impl Params {
     /// The blocks with their names.
-    pub fn blocks(&self) -> [(&'static str, &dyn Block); 8] {
+    pub fn blocks(&self) -> [(&'static str, &dyn Block); 9] {
         [
             ("sun", &self.sun),
             ("clouds", &self.clouds),
             ("upper_clouds", &self.upper_clouds),
             ("weather", &self.weather),
             ("wind", &self.wind),
+            ("wander", &self.wander),
             ("high_clouds", &self.high_clouds),
             ("light", &self.light),
             ("atmosphere", &self.atmosphere),
@@ -336,13 +359,14 @@ impl Params {
     }
 
     /// The same, to set them.
-    pub fn blocks_mut(&mut self) -> [(&'static str, &mut dyn Block); 8] {
+    pub fn blocks_mut(&mut self) -> [(&'static str, &mut dyn Block); 9] {
         [
             ("sun", &mut self.sun),
             ("clouds", &mut self.clouds),
             ("upper_clouds", &mut self.upper_clouds),
             ("weather", &mut self.weather),
             ("wind", &mut self.wind),
+            ("wander", &mut self.wander),
             ("high_clouds", &mut self.high_clouds),
             ("light", &mut self.light),
             ("atmosphere", &mut self.atmosphere),
@@ -421,6 +445,14 @@ impl Params {
             [upper.base, upper.top]
         };
         if self.has_upper_clouds() { [lower[0], lower[1].max(upper.top)] } else { lower }
+    }
+}
+
+impl Weather {
+    /// What the map is made from: the spot to keep clear is none of it.
+    pub fn map_only(&self) -> Self {
+        let Self { clear_at, clear_radius, .. } = Self::default();
+        Self { clear_at, clear_radius, ..self.clone() }
     }
 }
 
@@ -511,15 +543,16 @@ fn check_block(name: &str, block: &dyn Block) -> Result<()> {
 
 /// A block by the name that Python calls its type: every block of [`Params`], and [`Quality`].
 pub fn block(type_name: &str) -> Option<Box<dyn Block>> {
-    let Params { sun, clouds, upper_clouds, weather, wind, high_clouds, light, atmosphere, volume: _ } =
+    let Params { sun, clouds, upper_clouds, weather, wind, wander, high_clouds, light, atmosphere, volume: _ } =
         Params::default();
     let quality = Quality::default();
-    let blocks: [Box<dyn Block>; 9] = [
+    let blocks: [Box<dyn Block>; 10] = [
         Box::new(sun),
         Box::new(clouds),
         Box::new(upper_clouds),
         Box::new(weather),
         Box::new(wind),
+        Box::new(wander),
         Box::new(high_clouds),
         Box::new(light),
         Box::new(atmosphere),

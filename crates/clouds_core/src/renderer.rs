@@ -31,6 +31,7 @@ use crate::passes::volume::Volume;
 use crate::passes::weather::Weather;
 use crate::passes::{Bindings, Context, Scene, Uniforms, composite, march, path, points, reference, refine, reproject};
 use crate::shader::Linked;
+use crate::wind::Carried;
 
 /// Makes pictures of one size with one numerical method on one device.
 pub struct Renderer {
@@ -237,7 +238,8 @@ impl Renderer {
         first_sample: u32,
         interrupt: Interrupt<'_>,
     ) -> Result<Picture> {
-        let mut frame = self.begin(camera, params, time)?;
+        let (mut frame, params) = self.begin(camera, params, time)?;
+        let params = &params;
         frame.background = u32::from(background);
         frame.first_sample = first_sample;
         let method = Method::new(params, &self.quality);
@@ -325,7 +327,8 @@ impl Renderer {
         if Method::new(params, &self.quality) != Method::March {
             return self.refine(camera, params, time, background, interrupt);
         }
-        let mut frame = self.begin(camera, params, time)?;
+        let (mut frame, params) = self.begin(camera, params, time)?;
+        let params = &params;
         frame.background = u32::from(background);
         frame.cloudless = u32::from(Method::March.is_cloudless(params));
         let [width, height] = self.size;
@@ -355,7 +358,7 @@ impl Renderer {
         let last = last.filter(|last| last.frame.cloudless == frame.cloudless);
         let index = last.as_ref().map_or(0, |last| last.index + 1);
         if let Some(last) = &last {
-            frame.set_previous(&last.frame, camera.eye - last.camera.eye, params, time - last.time);
+            frame.set_previous(&last.frame, camera.eye - last.camera.eye, &Carried::new(params, last.time, time));
             frame.moving = u32::from(last.camera != *camera || last.params != *params || last.time != time);
         }
         // While anything moves, each round of the sixteen pixels moves the blue noise on by the golden ratio; a static
@@ -527,22 +530,24 @@ impl Renderer {
         most: usize,
         interrupt: Interrupt<'_>,
     ) -> Result<Vec<[f32; 4]>> {
-        let frame = self.begin(camera, params, time)?;
+        let (frame, params) = self.begin(camera, params, time)?;
+        let params = &params;
         let Self { gpu, world, quality, timings, .. } = self;
         let scene = world.run(gpu, params, &frame, (camera.eye, time), quality, timings, interrupt)?;
         let mut ctx = Context { gpu, uniforms: scene.uniforms, variant: scene.variant, timings, interrupt };
         points::run(&mut ctx, &scene, &frame, kernel, points, most)
     }
 
-    /// Checks the arguments of a call and works out its frame.
-    fn begin(&mut self, camera: &Camera, params: &Params, time: f64) -> Result<Frame> {
+    /// Checks the arguments of a call and works out its frame, and its sky, in which what wanders has its value.
+    fn begin(&mut self, camera: &Camera, params: &Params, time: f64) -> Result<(Frame, Params)> {
         check_fork()?;
         params.check()?;
         if !time.is_finite() {
             return Err(Error::parameter("time", time, "a finite number of seconds"));
         }
         self.timings = Timings::default();
-        Ok(Frame::new(camera, params, time, self.size))
+        let params = params.at(time);
+        Ok((Frame::new(camera, &params, time, self.size), params))
     }
 }
 
@@ -654,7 +659,7 @@ impl Shot {
             || turned
             || jumped
             || (old.clouds.seed, old.clouds.noise) != (new.clouds.seed, new.clouds.noise)
-            || old.weather != new.weather
+            || old.weather.map_only() != new.weather.map_only()
             || old.volume != new.volume
             || old.light.model != new.light.model
             || old.atmosphere.planet_radius != new.atmosphere.planet_radius

@@ -31,7 +31,7 @@ impl Majorants {
     pub fn run(&mut self, ctx: &mut Context<'_>, params: &Params, world: &Bindings<'_>) -> Result<Bindings<'_>> {
         let wanted = ctx.variant.model == Model::Path;
         let grid = params.volume.as_ref().map_or(0, |grid| Arc::as_ptr(grid) as usize);
-        let key = (wanted, grid, params.weather.clone(), params.clouds.clone(), params.upper_clouds.clone());
+        let key = (wanted, grid, params.weather.map_only(), params.clouds.clone(), params.upper_clouds.clone());
         let view = self.made.get(key, || {
             let (entry, size) = match &params.volume {
                 _ if !wanted => ("", [1; 3]),

@@ -5,8 +5,9 @@ use glam::{DVec2, DVec3};
 use super::{Baked, Bindings, Context};
 use crate::camera::Camera;
 use crate::error::Result;
-use crate::frame::{Frame, drift};
+use crate::frame::Frame;
 use crate::params::{self, Params};
+use crate::wind::{Carried, fastest};
 
 /// Cells across a level, and levels (as in sun_volume.wgsl).
 const SIDE: u32 = 96;
@@ -19,7 +20,15 @@ const EYE_STEP: f64 = 600.0;
 const CLOUD_STEP: f64 = 25.0;
 
 /// What the light is made from: whether it is wanted, sun, clouds, weather, wind and planet, and from where and when.
-type Key = (bool, [f32; 2], params::Clouds, params::UpperClouds, params::Weather, params::Wind, f32, [i64; 3]);
+type Key = (
+    bool,
+    [f32; 2],
+    (params::Clouds, params::UpperClouds),
+    params::Weather,
+    (params::Wind, params::Wander),
+    f32,
+    [i64; 3],
+);
 
 /// The levels on the GPU.
 pub(crate) struct SunVolume {
@@ -35,12 +44,7 @@ struct Origin {
 
 impl Origin {
     fn new(eye: DVec3, params: &Params, time: f64) -> Self {
-        let wind = &params.wind;
-        let fastest = [wind.speed, wind.weather_speed, wind.updraft, params.upper_clouds.speed]
-            .map(f32::abs)
-            .into_iter()
-            .fold(0.1, f32::max);
-        let period = CLOUD_STEP / f64::from(fastest);
+        let period = CLOUD_STEP / fastest(params).max(0.1);
         let place = (eye.truncate() / EYE_STEP).round();
         let steps = [place.x as i64, place.y as i64, (time / period).floor() as i64];
         Self { steps, place: EYE_STEP * place, time: period * (time / period).floor() }
@@ -50,7 +54,8 @@ impl Origin {
 /// Where the eye is in the volume of its picture.
 pub(crate) fn eye_in(eye: DVec3, params: &Params, time: f64) -> [f32; 2] {
     let origin = Origin::new(eye, params, time);
-    (eye.truncate() - origin.place - drift(params, time - origin.time).truncate()).as_vec2().to_array()
+    let drift = Carried::new(params, origin.time, time).drift();
+    (eye.truncate() - origin.place - drift.truncate()).as_vec2().to_array()
 }
 
 /// Cells between the lowest and the highest clouds.
@@ -77,9 +82,9 @@ impl SunVolume {
         let origin = Origin::new(eye, params, time);
         let sun = [params.sun.elevation, params.sun.azimuth];
         let radius = params.atmosphere.planet_radius;
-        let (clouds, upper) = (params.clouds.clone(), params.upper_clouds.clone());
-        let (weather, wind) = (params.weather.clone(), params.wind.clone());
-        let key = (wanted, sun, clouds, upper, weather, wind, radius, origin.steps);
+        let (clouds, weather) = ((params.clouds.clone(), params.upper_clouds.clone()), params.weather.clone());
+        let wind = (params.wind.clone(), params.wander.clone());
+        let key = (wanted, sun, clouds, weather, wind, radius, origin.steps);
         let view = self.made.get(key, || {
             let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
             if !wanted {

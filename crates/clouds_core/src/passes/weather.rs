@@ -24,7 +24,7 @@ impl Weather {
     }
 
     pub fn run(&mut self, ctx: &mut Context<'_>, params: &Params) -> Result<Bindings<'_>> {
-        let weather = &params.weather;
+        let weather = &params.weather.map_only();
         let view = self.map.get(weather.clone(), || {
             let texture = match &weather.map {
                 Some(map) => upload(ctx, map),

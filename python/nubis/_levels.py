@@ -1,0 +1,108 @@
+"""From one number to a cloud of one's own: presets, and `sky`, which puts the levels together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any
+
+import numpy.typing as npt
+
+from nubis._errors import ParameterError
+from nubis._nubis import DensityGrid
+from nubis.params import Params
+
+
+def _make() -> dict[str, Params]:
+    fair = Params()
+    skies: dict[str, dict[str, Any]] = {
+        "clear": {"clouds.coverage": 0.0, "high_clouds.coverage": 0.0},
+        "few": {
+            "clouds.coverage": 0.47,
+            "clouds.top": 2600.0,
+            "high_clouds.coverage": 0.35,
+        },
+        "scattered": {"clouds.coverage": 0.56, "clouds.type": 0.8},
+        "broken": {"clouds.coverage": 0.7, "clouds.type": 0.7},
+        "overcast": {"clouds.coverage": 0.9, "clouds.type": 0.35},
+        "stratus": {
+            "clouds.coverage": 0.95,
+            "clouds.type": 0.1,
+            "clouds.base": 400.0,
+            "clouds.top": 2400.0,
+            "high_clouds.coverage": 0.0,
+        },
+        "stratocumulus": {"clouds.coverage": 0.62, "clouds.type": 0.5},
+        "cumulus": {
+            "clouds.coverage": 0.5,
+            "clouds.type": 1.0,
+            "clouds.base": 1000.0,
+            "clouds.top": 4400.0,
+            "high_clouds.coverage": 0.3,
+        },
+        "storm": {
+            "clouds.coverage": 0.6,
+            "clouds.precipitation": 0.9,
+            "clouds.base": 900.0,
+            "clouds.top": 5500.0,
+        },
+        "cirrus": {"clouds.coverage": 0.25, "high_clouds.coverage": 0.6},
+    }
+    return {name: fair.with_(**fields) for name, fields in skies.items()}
+
+
+#: Skies by name: clouds of each kind, with the default sun, wind and air.
+presets: Mapping[str, Params] = MappingProxyType(_make())
+
+
+def sky(
+    cover: float | None = None,
+    *,
+    preset: str | None = None,
+    map: npt.ArrayLike | None = None,
+    volume: DensityGrid | None = None,
+    **fields: Any,
+) -> Params:
+    """Return the parameters of a sky, from as little or as much as is said of it.
+
+    Each level overrides the ones before it in what it sets, and leaves all else as it is.
+
+    Parameters
+    ----------
+    cover : float, optional
+        How much cloud, from 0, clear, to 1, overcast. Sets ``clouds.coverage``.
+    preset : str, optional
+        A name in `presets`. Sets every field, to what it is in ``presets[preset]``; the amount of
+        cloud is the preset's own where no `cover` is given, and else the `cover`.
+    map : array-like, shape (H, W, 3), optional
+        Coverage, type and precipitation by place, row 0 in the north. Sets ``weather.map``, and
+        takes it as it is, whatever `cover` and `preset` say of these: ``clouds.coverage`` 0.5,
+        ``clouds.type`` 0.5, ``clouds.precipitation`` 1.
+    volume : DensityGrid, optional
+        A cloud of your own. Sets ``volume``: it takes the place of all clouds but the high ones.
+    **fields
+        Deep fields, which override all of these: ``**{"sun.elevation": 5.0}``.
+
+    Raises
+    ------
+    ParameterError
+        For a value that is not allowed, and for a name that is no preset or field.
+    """
+    params = Params()
+    if preset is not None:
+        if not isinstance(preset, str) or preset not in presets:
+            raise ParameterError(
+                f"preset = {preset!r} is not allowed: it must be one of {', '.join(presets)}"
+            )
+        params = presets[preset]
+    if cover is not None:
+        try:
+            params = params.with_(**{"clouds.coverage": cover})
+        except ParameterError as error:
+            raise ParameterError(str(error).replace("clouds.coverage", "cover", 1)) from None
+    if map is not None:
+        as_it_is = {"clouds.coverage": 0.5, "clouds.type": 0.5, "clouds.precipitation": 1.0}
+        params = params.with_(**{"weather.map": map}, **as_it_is)
+    if volume is not None:
+        params = params.replace(volume=volume)
+    return params.with_(**fields)

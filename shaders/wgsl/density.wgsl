@@ -79,7 +79,7 @@ fn cloud_column(p: vec3f, altitude: f32) -> Column {
     let height = (altitude - params.clouds.base) / (params.clouds.top - params.clouds.base);
     let at = p.xy - height * params.wind.shear * frame.wind_direction;
     let uv = frame.weather_origin + vec2f(at.x, -at.y) / params.weather.extent;
-    let weather = weather_from_map(textureSampleLevel(weather_map, repeat_sampler, uv, 0.0).rgb);
+    let weather = weather_from_map(textureSampleLevel(weather_map, weather_sampler, uv, 0.0).rgb);
     let profile = height_profile(height, weather.kind);
     // The noise is at most 1: where the profile alone does not rise above 1 - coverage, nothing does.
     let inside = height > 0.0 && height < 1.0;

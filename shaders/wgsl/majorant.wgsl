@@ -10,6 +10,13 @@ struct Majorant {
     reach: f32, // m
 }
 
+// The place in the weather map that is read at `uv`, as its sampler has it.
+fn within_map(uv: vec2f) -> vec2f {
+    let twice = uv - 2.0 * floor(0.5 * uv);
+    let inside = select(uv - floor(uv), min(twice, 2.0 - twice), params.weather.edge == EDGE_MIRROR);
+    return select(inside, saturate(uv), params.weather.edge == EDGE_CLAMP);
+}
+
 // Of a point between base and top, or in the box.
 fn majorant_at(p: vec3f, altitude: f32) -> Majorant {
     let size = vec3f(textureDimensions(majorants));
@@ -23,7 +30,7 @@ fn majorant_at(p: vec3f, altitude: f32) -> Majorant {
         let height = (altitude - params.clouds.base) / thickness;
         let at = p.xy - height * params.wind.shear * frame.wind_direction;
         let uv = frame.weather_origin + vec2f(at.x, -at.y) / params.weather.extent;
-        cell = vec3f(uv - floor(uv), height) * size;
+        cell = vec3f(within_map(uv), height) * size;
         // Going up a metre also goes sideways in the map, by the wind's lean.
         let lean = abs(params.wind.shear) / thickness;
         reach = min(params.weather.extent / max(size.x, size.y) / (1.0 + lean), thickness / size.z);

@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3, Vec3};
 
 use crate::camera::{Camera, Projection};
 use crate::params;
-use crate::params::Params;
+use crate::params::{Edge, Params};
 use crate::passes::sun_volume;
 
 params! {
@@ -191,6 +191,18 @@ pub(crate) fn drift(params: &Params, elapsed: f64) -> DVec3 {
     ((weather + shape) * 0.5).extend(0.5 * f64::from(wind.updraft)) * elapsed
 }
 
+/// Where `v` is on a weather map that is `extent` wide, from 0 to 1 across it, in f64 as `wrap`.
+fn on_map(v: f64, extent: f32, edge: Edge) -> f32 {
+    match edge {
+        Edge::Repeat => wrap(v, extent),
+        // A map and its mirror image repeat together.
+        Edge::Mirror => 2.0 * wrap(0.5 * v, extent),
+        // So far away that f32 does not tell where, no map is in sight; and a way too long for f64 leads nowhere.
+        Edge::Clamp if v.is_nan() => 0.0,
+        Edge::Clamp => (v / f64::from(extent)).clamp(-1e12, 1e12) as f32,
+    }
+}
+
 impl Frame {
     /// The frame of a picture of `size` pixels seen by `camera` at `time` seconds.
     pub fn new(camera: &Camera, params: &Params, time: f64, size: [u32; 2]) -> Self {
@@ -284,7 +296,8 @@ impl Frame {
         let weather =
             eye.truncate() - compass(f64::from(wind.weather_direction)) * f64::from(wind.weather_speed) * time;
         let half = 0.5 * f64::from(params.weather.extent);
-        self.weather_origin = plane(DVec2::new(weather.x + half, half - weather.y), params.weather.extent);
+        let (extent, edge) = (params.weather.extent, params.weather.edge);
+        self.weather_origin = [on_map(weather.x + half, extent, edge), on_map(half - weather.y, extent, edge)];
 
         let along = compass(f64::from(high.direction));
         let across = DVec2::new(-along.y, along.x);

@@ -6,7 +6,7 @@
 use std::sync::Arc;
 
 use crate::error::{Error, Result};
-use crate::schema::{self, Block, Map};
+use crate::schema::{self, Block, Map, Typed as _};
 use crate::volume::DensityGrid;
 use crate::{choice, params};
 
@@ -17,6 +17,30 @@ choice! {
         Nubis2015 = "nubis2015",
         /// Perlin-Worley of rising frequency in every channel.
         Vsu2022 = "vsu2022",
+    }
+}
+
+choice! {
+    /// Which noises the weather map is made of.
+    WeatherNoise {
+        /// Blobs of Worley noise that lean on a Perlin noise.
+        WorleyPerlin = "worley_perlin",
+        /// Worley noise weighed by simplex noise (thesis2018).
+        WorleySimplex = "worley_simplex",
+        /// Perlin-Worley noise (vsu2022).
+        PerlinWorley = "perlin_worley",
+    }
+}
+
+choice! {
+    /// What lies beyond the edge of the weather map.
+    Edge {
+        /// The map again.
+        Repeat = "repeat",
+        /// Its mirror image.
+        Mirror = "mirror",
+        /// The texels of its edge, for ever.
+        Clamp = "clamp",
     }
 }
 
@@ -84,16 +108,22 @@ params! {
 
     /// The weather map: where the clouds stand.
     Weather {
-        /// Width of the square that one map covers; beyond it the map repeats.
+        /// Width of the square that one map covers, about the origin of the world.
         extent: f32 = 60000.0, in 100..=10000000 "m";
+        /// What lies beyond that square: the map again, its mirror image, or what is at its edge.
+        edge: Edge = Edge::Repeat;
         /// A map of your own: coverage, type and precipitation, row 0 in the north; None bakes one from noise.
         map: Option<Arc<Map>> = None, in 0..=1 "";
+        /// Which noises the map is baked from: `worley_simplex` is thesis2018's, `perlin_worley` vsu2022's.
+        noise: WeatherNoise = WeatherNoise::WorleyPerlin;
         /// Which random weather.
         seed: u32 = 7, in 0..=4294967295.0 "";
         /// Typical distance between clouds.
         scale: f32 = 5000.0, in 100..=1000000 "m";
         /// How much the cover varies over distances of several clouds.
         variety: f32 = 0.5, in 0..=1 "";
+        /// How much the type of cloud varies from place to place; 0 makes it the same everywhere.
+        type_variety: f32 = 0.9, in 0..=2 "";
     }
 
     /// What moves the clouds.
@@ -251,6 +281,9 @@ pub struct Params {
     pub high_clouds: HighClouds,
     pub light: Light,
     pub atmosphere: Atmosphere,
+    /// Other weathers and their shares of the weather map, each 0 to 1 and 1 together at most; the rest is that of
+    /// `weather`. All cover the same square.
+    pub weather_mix: Vec<(Weather, f32)>,
     /// A cloud of the user's own in place of the procedural ones.
     pub volume: Option<Arc<DensityGrid>>,
 }
@@ -291,7 +324,62 @@ impl Params {
             let base = self.clouds.base;
             return Err(Error::parameter("clouds.top", self.clouds.top, format!("above clouds.base = {base} m")));
         }
+        self.check_mix()
+    }
+
+    fn check_mix(&self) -> Result<()> {
+        let mut sum = 0.0;
+        for (index, (weather, share)) in self.weather_mix.iter().enumerate() {
+            let path = format!("weather_mix[{index}]");
+            check_block(&path, weather)?;
+            // Written so that NaN fails it.
+            if !(*share >= 0.0 && *share <= 1.0) {
+                return Err(Error::parameter(&format!("{path} weight"), share, "a number from 0 to 1"));
+            }
+            sum += f64::from(*share);
+            let (extent, edge) = (self.weather.extent, self.weather.edge.to_value());
+            if weather.extent != extent {
+                let allowed = format!("weather.extent = {extent} m, as of all weathers of a mixture");
+                return Err(Error::parameter(&format!("{path}.extent"), weather.extent, allowed));
+            }
+            if weather.edge.to_value() != edge {
+                let allowed = format!("weather.edge = {edge}, as of all weathers of a mixture");
+                return Err(Error::parameter(&format!("{path}.edge"), weather.edge.to_value(), allowed));
+            }
+        }
+        // Shares that are 1 in sum may pass it by their rounding.
+        if sum > 1.0 + 1e-5 {
+            let allowed = "weights of at most 1 together: the rest is that of weather";
+            return Err(Error::parameter("weather_mix", format!("weights of {sum} together"), allowed));
+        }
         Ok(())
+    }
+
+    /// What the weather map is made of: maps by what they depend on, and their shares, which are 1 together.
+    pub fn weather_shares(&self) -> Vec<(Weather, f32)> {
+        let mixed: f32 = self.weather_mix.iter().map(|(_, share)| share).sum();
+        let mut shares: Vec<(Weather, f32)> = Vec::new();
+        let all = self.weather_mix.iter().map(|(weather, share)| (weather, *share));
+        for (weather, share) in std::iter::once((&self.weather, (1.0 - mixed).max(0.0))).chain(all) {
+            let source = weather.source();
+            match shares.iter_mut().find(|(known, _)| *known == source) {
+                Some((_, sum)) => *sum += share,
+                None => shares.push((source, share)),
+            }
+        }
+        // Half floats do not tell less.
+        shares.retain(|(_, share)| *share > 1e-6);
+        shares
+    }
+}
+
+impl Weather {
+    /// The weather with what its map does not depend on at the default.
+    fn source(&self) -> Self {
+        match &self.map {
+            Some(map) => Self { map: Some(map.clone()), ..Self::default() },
+            None => Self { edge: Edge::Repeat, ..self.clone() },
+        }
     }
 }
 
@@ -382,7 +470,8 @@ fn check_block(name: &str, block: &dyn Block) -> Result<()> {
 
 /// A block by the name that Python calls its type: every block of [`Params`], and [`Quality`].
 pub fn block(type_name: &str) -> Option<Box<dyn Block>> {
-    let Params { sun, clouds, weather, wind, high_clouds, light, atmosphere, volume: _ } = Params::default();
+    let Params { sun, clouds, weather, wind, high_clouds, light, atmosphere, weather_mix: _, volume: _ } =
+        Params::default();
     let quality = Quality::default();
     let blocks: [Box<dyn Block>; 8] = [
         Box::new(sun),

@@ -51,8 +51,10 @@ fn majorant_weather(@builtin(global_invocation_id) id: vec3u) {
     textureStore(volume_out, id, vec4f(ROUND_UP * bound));
 }
 
+// What lies beyond the edge of the weather map; beside its edge its mirror image begins with the same texels.
 fn wrapped(at: vec2i, size: vec2i) -> vec2i {
-    return ((at % size) + size) % size;
+    let repeated = ((at % size) + size) % size;
+    return select(clamp(at, vec2i(0), size - 1), repeated, params.weather.edge == EDGE_REPEAT);
 }
 
 // The largest value of `height_profile` between two heights and two types.
@@ -69,7 +71,7 @@ fn largest_profile(heights: vec2f, kinds: vec2f) -> f32 {
     return remap01(heights.y, first.x, first.y) * (1.0 - smoothstep(last.z, last.w, heights.x));
 }
 
-// The largest of a cell and its neighbours. The weather map repeats.
+// The largest of a cell and its neighbours.
 @compute @workgroup_size(4, 4, 4)
 fn majorant_dilate(@builtin(global_invocation_id) id: vec3u) {
     let size = vec3i(textureDimensions(volume_out));

@@ -14,7 +14,7 @@ const CELLS: [u32; 2] = [64, 16];
 const TEXELS: u32 = 8;
 
 /// What the majorants are made from: the grid by its address, or weather and cover.
-type Key = (bool, usize, params::Weather, params::Clouds);
+type Key = (bool, usize, params::Weather, Vec<(params::Weather, f32)>, params::Clouds);
 
 /// The majorants on the GPU.
 pub(crate) struct Majorants {
@@ -30,13 +30,14 @@ impl Majorants {
     pub fn run(&mut self, ctx: &mut Context<'_>, params: &Params, world: &Bindings<'_>) -> Result<Bindings<'_>> {
         let wanted = ctx.variant.model == Model::Path;
         let grid = params.volume.as_ref().map_or(0, |grid| Arc::as_ptr(grid) as usize);
-        let key = (wanted, grid, params.weather.clone(), params.clouds.clone());
+        let (weather, mix) = (params.weather.clone(), params.weather_mix.clone());
+        let key = (wanted, grid, weather, mix, params.clouds.clone());
         let view = self.made.get(key, || {
             let (entry, size) = match &params.volume {
                 _ if !wanted => ("", [1; 3]),
                 Some(grid) => ("majorant_grid", grid.size().map(|n| n.div_ceil(BRICK) as u32)),
                 None => {
-                    let across = weather::size(&params.weather).map(|n| n.div_ceil(TEXELS).clamp(1, CELLS[0]));
+                    let across = weather::size(params).map(|n| n.div_ceil(TEXELS).clamp(1, CELLS[0]));
                     ("majorant_weather", [across[0], across[1], CELLS[1]])
                 }
             };
@@ -47,7 +48,8 @@ impl Majorants {
                 let (from, to) = (view(&bounds), view(&dilated));
                 let bindings = [world.as_slice(), &[("volume_out", (&from).into())]].concat();
                 work.dispatch(&*ctx.gpu.kernel("majorant", entry, ctx.variant)?, &bindings, size)?;
-                let bindings = [("volume_in", (&from).into()), ("volume_out", (&to).into())];
+                let bindings =
+                    [world.as_slice(), &[("volume_in", (&from).into()), ("volume_out", (&to).into())]].concat();
                 work.dispatch(&*ctx.gpu.kernel("majorant", "majorant_dilate", ctx.variant)?, &bindings, size)?;
                 work.submit(ctx.timings, ctx.interrupt)?;
             }

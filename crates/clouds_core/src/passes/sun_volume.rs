@@ -15,7 +15,8 @@ const EYE_STEP: f64 = 600.0;
 const CLOUD_STEP: f64 = 25.0;
 
 /// What the light is made from: whether it is wanted, sun, clouds, weather, wind and planet, and from where and when.
-type Key = (bool, [f32; 2], params::Clouds, params::Weather, params::Wind, f32, [i64; 3]);
+type Key =
+    (bool, [f32; 2], params::Clouds, (params::Weather, Vec<(params::Weather, f32)>), params::Wind, f32, [i64; 3]);
 
 /// The levels on the GPU.
 pub(crate) struct SunVolume {
@@ -64,7 +65,8 @@ impl SunVolume {
         let origin = Origin::new(eye, params, time);
         let sun = [params.sun.elevation, params.sun.azimuth];
         let radius = params.atmosphere.planet_radius;
-        let (clouds, weather, wind) = (params.clouds.clone(), params.weather.clone(), params.wind.clone());
+        let weather = (params.weather.clone(), params.weather_mix.clone());
+        let (clouds, wind) = (params.clouds.clone(), params.wind.clone());
         let key = (wanted, sun, clouds, weather, wind, radius, origin.steps);
         let view = self.made.get(key, || {
             let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());

@@ -200,7 +200,7 @@ def weather_texels(texels, weather):
         least, most = 0.2, 0.75
     else:
         coverage = perlin_worley(fbm(cells, 4, 9), remap01(np.stack(w, axis=-1) @ FBM, 0.1, 0.65))
-        least, most = 0.0, 0.6
+        least, most = -0.05, 0.6
     # How much there is of them from one region to the next.
     coverage = coverage + f32(weather.variety) * (fbm(broad, 3, 16) - 0.5)
     coverage = remap01(coverage, least, most)

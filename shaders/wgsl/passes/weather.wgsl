@@ -32,7 +32,7 @@ fn cover(p: vec3f, cells: u32, seed: u32) -> vec3f {
     }
     if WEATHER_NOISE == NOISE_PERLIN_WORLEY {
         let blobs = remap01(worley_fbm(p, cells, seed), 0.1, 0.65);
-        return vec3f(perlin_worley(shape, blobs), 0.0, 0.6);
+        return vec3f(perlin_worley(shape, blobs), -0.05, 0.6);
     }
     // Clouds stand where Worley's blobs are, and lean on a Perlin noise so that no two are alike.
     let blobs = worley(p, cells, seed) * 0.6 + worley(p, cells * 2u, seed + 1u) * 0.4;

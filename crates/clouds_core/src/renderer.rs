@@ -662,9 +662,10 @@ impl Shot {
     }
 }
 
-/// Largest share of the weather map that one frame may replace and still look like the one before: a change takes
-/// thirty seconds (thesis2018), and a time-lapse of it a few frames.
-const MOST_WEATHER_CHANGE: f32 = 0.25;
+/// Largest share of the weather map that may change from one frame to the next without a cut: a third within the sixteen
+/// frames in which every pixel is marched anew. A change in thirty seconds (thesis2018) is that slow from two frames a
+/// second on.
+const MOST_WEATHER_CHANGE: f32 = 0.02;
 
 /// The share of the weather map that is another.
 fn weather_change(old: &Params, new: &Params) -> f32 {

@@ -148,11 +148,16 @@ def test_a_clamped_map_far_away(renderer, rng):
 
 
 @pytest.mark.parametrize("edge", EDGES)
-@pytest.mark.parametrize("size", [(8, 8), (100, 37)])
+@pytest.mark.parametrize("size", [(128, 96), (100, 37)])
 def test_majorants_beyond_the_edge(rng, edge, size):
-    """Never exceeded within their reach: in the map, across its edge and far beyond."""
-    (map,) = maps(1, size)
-    params = edge_sky(map, edge, **{"light.model": "path", "wind.shear": 1500.0})
+    """Never exceeded within their reach: in the map, across its edge and far beyond. Cloud stands
+    in the north-east alone, so that it matters which side of the map is beyond which.
+    """
+    map = np.zeros((*size, 3), np.float32)
+    map[: size[0] // 3, size[1] // 2 :, 0] = 1
+    map[..., 1] = 0.5
+    changes = {"light.model": "path", "wind.shear": 1500.0, "clouds.coverage": 0.5}
+    params = edge_sky(map, edge, **changes)
     clouds, reach_of = params.clouds, "majorant_at(x.xyz, altitude_at(x.xyz))"
 
     def ask(expression, points):
@@ -173,21 +178,25 @@ def test_majorants_beyond_the_edge(rng, edge, size):
     bound = ask(f"vec4f({reach_of}.density)", start)[:, 0]
     inside = (start[:, 2] > clouds.base + 50) & (start[:, 2] < clouds.top - 50)
     assert (density <= bound + 1e-4)[inside].all()
+    # And no more than they must be: the eastern clouds are beyond the western edge in one case.
+    west = rng.uniform([-8900, 4000, 1250], [-8500, 9000, 1300], (1000, 3))
+    assert (ask(f"vec4f({reach_of}.density)", west)[:, 0] > 0).any() == (edge == "repeat")
 
 
 @pytest.mark.parametrize("edge", EDGES)
 def test_paths_beyond_the_edge(renderer, edge):
     """Paths of one scattering and the reference see the same clouds past the edge of a map."""
-    map = np.zeros((16, 16, 3), np.float32)
+    map = np.zeros((128, 128, 3), np.float32)
     map[..., 1] = 0.6
-    map[:, 11:, 0] = 0.9  # cloud in the east,
-    map[:, :3, 0] = 0.8  # and some in the west
+    map[:, 90:, 0] = 0.9  # cloud in the east,
+    map[:, :26, 0] = 0.6  # and some in the west
     params = twin.smooth_params(
         **{
             "weather.map": map,
             "weather.edge": edge,
             "weather.extent": 8000.0,
-            "clouds.coverage": 0.7,
+            "clouds.coverage": 0.6,
+            "clouds.type": 0.8,
             "light.model": "single",
             "sun.elevation": 50.0,
         }

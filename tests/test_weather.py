@@ -71,6 +71,18 @@ class TestNoises:
         assert 0.2 < coverage.std() < 0.4
         assert coverage.min() == 0 and coverage.max() == 1
 
+    def test_scale(self, renderer, noise):
+        """Twice the distance between clouds: half as many of them along a line across the map."""
+
+        def crossings(scale):
+            weather = Weather(noise=noise, scale=scale, variety=0.0)
+            coverage = renderer().weather_map(Params(weather=weather))[..., 0]
+            above = coverage > np.median(coverage)
+            return (above[:, 1:] != above[:, :-1]).mean()
+
+        # Small shapes have edges that no texel resolves.
+        assert 1.6 < crossings(5000.0) / crossings(10_000.0) < 2.2
+
     def test_variety(self, renderer, noise):
         """More of it: the mean over regions of several clouds varies more; of types alike."""
 

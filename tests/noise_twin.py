@@ -81,6 +81,30 @@ def perlin_fbm(p, period, octaves, salt):
     return np.clip(0.5 + 0.85 * total / (0.5**octave).sum(), 0, 1)
 
 
+def simplex(p, period, salt):
+    """Perlin 2001 in the plane, as the sum over all points of a lattice of triangles near by: rows
+    of them, every other one shifted by half a triangle, whose number is even so that they repeat.
+    A gradient reaches as far as the triangles at its point.
+    """
+    rows = 2 * max(round(period / math.sqrt(3)), 1)
+    x, y = np.moveaxis(p * np.array([period, rows]), -1, 0)
+    total = 0.0
+    for i, j in itertools.product(range(-2, 4), range(-1, 3)):
+        column, row = (np.floor(v).astype(np.int64) + k for v, k in ((x, i), (y, j)))
+        apart = np.stack([x - column + row % 2 / 2, (y - row) * math.sqrt(3) / 2], axis=-1)
+        cell = np.stack([column % period, row % rows, 0 * row], axis=-1)
+        gradient = 2 * random3(cell, salt)[..., :2] - 1
+        weight = (3 / 4 - (apart**2).sum(axis=-1)).clip(0) ** 4
+        total = total + weight * (gradient * apart).sum(axis=-1)
+    return 7 * total
+
+
+def simplex_fbm(p, period, octaves, salt):
+    octave = np.arange(octaves)
+    total = sum(simplex(p, period * 2**i, salt + i) / 2**i for i in octave)
+    return np.clip(0.5 + 0.85 * total / (0.5**octave).sum(), 0, 1)
+
+
 def worley(p, period, salt):
     """Worley 1996 with one point a cell, inverted: 1 at a point, 0 a cell away from the nearest."""
     distance = 1.0
@@ -160,21 +184,34 @@ def weather_texels(texels, weather):
     seed = 97 * weather.seed
     cells = max(round(f32(weather.extent) / f32(weather.scale)), 1)
     broad = max(cells // 4, 1)
-    # Blobs, their shape, and how much there is of them from one region to the next.
-    coverage = (
-        0.9 * (0.6 * worley(p, cells, seed + 7) + 0.4 * worley(p, 2 * cells, seed + 8))
-        + 0.7 * (perlin_fbm(p, cells, 4, seed + 9) - 0.5)
-        + f32(weather.variety) * (perlin_fbm(p, broad, 3, seed + 16) - 0.5)
-    )
-    coverage = remap01(coverage, 0.2, 0.7)
-    kind = 0.5 + 0.9 * (perlin_fbm(p, max(cells // 3, 1), 3, seed + 47) - 0.5)
-    rain = perlin_fbm(p, broad, 2, seed + 77) + 0.3 * (coverage - 0.5)
+
+    def fbm(period, octaves, salt):
+        if weather.noise == "worley_simplex":
+            return simplex_fbm(p[..., :2], period, octaves, seed + salt)
+        return perlin_fbm(p, period, octaves, seed + salt)
+
+    w = [worley(p, cells * 2**i, seed + 7 + i) for i in range(3)]
+    # Blobs and their shape.
+    if weather.noise == "worley_perlin":
+        coverage = 0.9 * (0.6 * w[0] + 0.4 * w[1]) + 0.7 * (fbm(cells, 4, 9) - 0.5)
+        least, most = 0.2, 0.7
+    elif weather.noise == "worley_simplex":
+        coverage = np.stack(w, axis=-1) @ FBM * (0.2 + 1.6 * fbm(cells, 4, 9))
+        least, most = 0.2, 0.75
+    else:
+        coverage = perlin_worley(fbm(cells, 4, 9), remap01(np.stack(w, axis=-1) @ FBM, 0.1, 0.65))
+        least, most = -0.05, 0.6
+    # How much there is of them from one region to the next.
+    coverage = coverage + f32(weather.variety) * (fbm(broad, 3, 16) - 0.5)
+    coverage = remap01(coverage, least, most)
+    kind = 0.5 + f32(weather.type_variety) * (fbm(max(cells // 3, 1), 3, 47) - 0.5)
+    rain = fbm(broad, 2, 77) + 0.3 * (coverage - 0.5)
     return np.stack([coverage, np.clip(kind, 0, 1), remap01(rain, 0.3, 0.7)], axis=-1)
 
 
 def broad_texels(texels, weather):
-    """What the larger map shifts coverage, type and precipitation by, and another noise: at most
-    half, nothing in the middle. From a map of the user's, whose fourth is 0.
+    """What the larger map shifts coverage, type and precipitation by, and what bends the smaller
+    one: at most half, nothing in the middle. From a map of the user's, whose fourth is 0.
     """
     texels = np.asarray(texels)
     if weather.broad_map is not None:
@@ -184,8 +221,9 @@ def broad_texels(texels, weather):
     seed = 97 * weather.seed + 131
 
     def noise(p):
-        fbm = [perlin_fbm(p, 3 * (2 - i % 2), 2, seed + 8 * i) for i in range(4)]
-        return np.stack(fbm, axis=-1)
+        fbm = [perlin_fbm(p, period, 2, seed + 8 * i) for i, period in enumerate((6, 3, 6))]
+        # What bends is the same for every seed.
+        return np.stack([*fbm, perlin_fbm(p, 3, 2, 155)], axis=-1)
 
     p = np.stack([x, 1 - y, np.full_like(x, 0.5)], axis=-1)
     return (noise(p) - noise(np.full((1, 3), 0.5))).clip(-0.5, 0.5)
@@ -302,14 +340,24 @@ def mip(bake, texels, level):
     return bake(2**level * texels[..., None, :] + corners).mean(axis=-2)
 
 
-def sample(bake, size, at):
-    """Linear between the centres of texels, repeating; `at` in tiles, shape (N, 2 or 3)."""
+def sample(bake, size, at, edge="repeat"):
+    """Linear between the centres of texels; `at` in tiles, shape (N, 2 or 3). Beyond the texels
+    there are the same again, their mirror image, or the outermost ones.
+    """
     at = at * np.array(size) - 0.5
     corners = np.array(list(itertools.product((0, 1), repeat=at.shape[-1])))
     first = np.floor(at).astype(np.int64)
     beyond = (at - first)[:, None]
     weights = np.where(corners, beyond, 1 - beyond).prod(axis=-1)
-    return (weights[..., None] * bake(np.mod(first[:, None] + corners, size))).sum(axis=1)
+    texel = first[:, None] + corners
+    if edge == "repeat":
+        texel = np.mod(texel, size)
+    elif edge == "mirror":
+        texel = np.mod(texel, 2 * np.array(size))
+        texel = np.where(texel < size, texel, 2 * np.array(size) - 1 - texel)
+    else:
+        texel = np.clip(texel, 0, np.array(size) - 1)
+    return (weights[..., None] * bake(texel)).sum(axis=1)
 
 
 def smoothstep(a, b, v):
@@ -476,14 +524,14 @@ class Field:
         at = 0.5 + on_map * down
         size = WEATHER_SIZE if weather.map is None else weather.map.shape[1::-1]
         if weather.broad_variety == 0 or (weather.map is not None and weather.broad_map is None):
-            return sample(self.textures["weather_map"], size, at)[:, :3]
+            return sample(self.textures["weather_map"], size, at, weather.edge)[:, :3]
         own = weather.broad_map
         broad_at = 0.5 + (upright - drift) / f32(weather.broad_extent) * down
         broad_size = BROAD_SIZE if own is None else own.shape[1::-1]
         shift = sample(self.textures["broad_map"], broad_size, broad_at)
         if own is None:
-            at = at + 0.5 * shift[:, [3, 1]]
-        texel = sample(self.textures["weather_map"], size, at)[:, :3]
+            at = at + 0.8 * shift[:, 3:] * np.array([0.8, 0.6])
+        texel = sample(self.textures["weather_map"], size, at, weather.edge)[:, :3]
         return np.clip(texel + f32(weather.broad_variety) * shift[:, :3], 0, 1)
 
     def weather(self, points, altitude):

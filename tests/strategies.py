@@ -103,6 +103,23 @@ def grids(draw):
 
 
 @st.composite
+def mixtures(draw, sky):
+    """Up to three other weathers for a sky, some of no weight and some of all."""
+    same = {n: getattr(sky.weather, n) for n in ("extent", "edge", "broad_extent")}
+    weathers = st.one_of(
+        images(3).map(lambda map: nubis.Weather(map=map, **same)),
+        st.integers(0, 2).map(lambda seed: nubis.Weather(seed=seed, **same)),
+        st.just(sky.weather),
+    )
+    left, mix = 1.0, []
+    for weather in draw(st.lists(weathers, max_size=3)):
+        weight = left * draw(st.sampled_from([0.0, 1e-7, 0.3, 0.5, 1.0]))
+        left -= weight
+        mix.append((weather, weight))
+    return tuple(mix)
+
+
+@st.composite
 def params(draw, fields=tuple(FIELDS), **fixed):
     """A few parameters away from their defaults, or all of them."""
     few = st.lists(st.sampled_from(fields), unique=True, max_size=10)
@@ -130,6 +147,8 @@ def params(draw, fields=tuple(FIELDS), **fixed):
         if base < lower:
             values["upper_clouds.coverage"] = 0.0
     sky = Params().with_(**values)
+    if draw(st.integers(0, 5)) == 0:
+        sky = sky.replace(weather_mix=draw(mixtures(sky)))
     if hasattr(nubis, "DensityGrid") and draw(st.integers(0, 3)) == 0:
         sky = sky.replace(volume=draw(grids()))
     return sky

@@ -78,6 +78,36 @@ def test_noises_at_points(rng, period, salt):
     assert (error < 2.0**-23 * period * slopes + 1e-6).all(), error
 
 
+@pytest.mark.parametrize("salt", [0, 977, 2**32 - 2])
+@pytest.mark.parametrize("period", [1, 2, 3, 7, 48])
+def test_simplex_noise(rng, period, salt):
+    """Over several tiles, so that it must tile as well; its slope is under 4 a triangle."""
+    p = noise_twin.f32(rng.uniform(-2, 3, (4000, 2)))
+    wgsl = f"simplex(x.xy, {period}u, {salt}u), simplex_fbm(x.xy, {period}u, 4u, {salt}u)"
+    got = probe(f"vec4f({wgsl}, 0.0, 0.0)", p, imports=["gradient_noise"])
+    expected = [
+        noise_twin.simplex(p, period, salt),
+        noise_twin.simplex_fbm(p, period, 4, salt),
+    ]
+    slopes = np.array([4, 4 * 4 * 0.85 / 1.875])
+    error = np.abs(got.T[:2] - expected).max(axis=1)
+    assert (error < 2.0**-23 * period * slopes + 1e-6).all(), error
+
+
+def test_simplex_noise_is_like_perlin_noise(rng):
+    """As wide, so that one can stand for the other; about 0, and smooth from tile to tile."""
+    p = rng.uniform(0, 1, (100_000, 3))
+    simplex = noise_twin.simplex(p[:, :2], 48, 5)
+    assert abs(simplex.mean()) < 5e-3
+    assert simplex.std() == pytest.approx(noise_twin.perlin(p, 48, 5).std(), rel=0.05)
+    edge, e = np.zeros((1000, 2)), 1e-6
+    edge[:, 1] = rng.uniform(0, 1, 1000)
+    for side in (edge, edge[:, ::-1]):
+        across = (side == 0) * e
+        step = noise_twin.simplex(1 + side - across, 5, 9) - noise_twin.simplex(across + side, 5, 9)
+        assert np.abs(step).max() < 1e-4
+
+
 def test_perlin_worley(rng):
     inputs = np.concatenate([rng.uniform(0, 1, (3000, 2)), [(0, 0), (1, 0), (0, 1), (1, 1)]])
     got = probe("perlin_worley(x.x, x.y)", inputs, imports=["gradient_noise"])[:, 0]
@@ -135,9 +165,20 @@ def test_curl_noise(rng, noise_params):
         {},
         {"extent": 33_333.3, "scale": 2100.0, "variety": 0.9, "seed": SEED},
         {"extent": 20_000.0, "scale": 60_000.0, "variety": 0.0},
+        {"noise": "worley_simplex", "type_variety": 1.7},
+        {"noise": "worley_simplex", "extent": 33_333.3, "scale": 2100.0, "seed": SEED},
+        {"noise": "perlin_worley", "seed": SEED},
         {"map": np.random.default_rng(3).uniform(0, 1, (5, 7, 3))},
     ],
-    ids=["default", "many cells", "one cell", "of your own"],
+    ids=[
+        "default",
+        "many cells",
+        "one cell",
+        "simplex",
+        "simplex, many cells",
+        "perlin_worley",
+        "of your own",
+    ],
 )
 def test_weather_map(rng, weather):
     params = nubis.Params().with_(**{f"weather.{name}": value for name, value in weather.items()})
@@ -280,19 +321,20 @@ def added(rng, kind):
 
 
 @pytest.mark.parametrize(
-    ("seed", "time", "kind"),
+    ("seed", "time", "kind", "edge"),
     [
-        (1, 0.0, "plain"),
-        (2, 1e5, "dry"),
-        (3, 1e9, "plain"),
-        (4, -1e7, "own map"),
-        (5, 1e4, "own maps"),
-        (6, 1e8, "decks"),
-        (7, -1e5, "shafts"),
-        (8, 1e3, "table"),
+        (1, 0.0, "plain", "repeat"),
+        (2, 1e5, "dry", "mirror"),
+        (3, 1e9, "plain", "repeat"),
+        (4, -1e7, "own map", "mirror"),
+        (5, 1e4, "own maps", "clamp"),
+        (6, 1e8, "decks", "repeat"),
+        (7, -1e5, "shafts", "mirror"),
+        (8, 1e3, "table", "repeat"),
+        (9, -3e3, "plain", "clamp"),
     ],
 )
-def test_extinction(renderer, noise_params, seed, time, kind):
+def test_extinction(renderer, noise_params, seed, time, kind, edge):
     """The whole field, twice: with the twin's own texels, and with those on the GPU.
 
     Errors are shares of the extinction at density 1.
@@ -308,7 +350,7 @@ def test_extinction(renderer, noise_params, seed, time, kind):
       read by up to 12 m: in such skies up to 3e-2 (1.4e-3).
     """
     rng = np.random.default_rng(seed)
-    params = any_sky(rng, noise_params)
+    params = any_sky(rng, noise_params).with_(**{"weather.edge": edge})
     params = params.with_(**added(rng, kind))
     points, heights = points_about_the_shell(rng, params, 1000)
     # The twin follows each swing: ten thousand at most.

@@ -18,11 +18,14 @@ from nubis._errors import (
     NubisError,
     ParameterError,
 )
-from nubis._image import save, to_srgb8
+from nubis._image import load_map, save, to_srgb8
+from nubis._lerp import lerp
 from nubis._levels import presets, sky
 from nubis._nubis import Camera, DensityGrid
+from nubis._paint import paint, paint_mask
 from nubis._renderer import Adapter, Renderer, adapters, quality
 from nubis._scenes import scenes
+from nubis._weather import WeatherBlend, WeatherChange
 from nubis.params import (
     Atmosphere,
     Clouds,
@@ -60,8 +63,14 @@ __all__ = [
     "UpperClouds",
     "Wander",
     "Weather",
+    "WeatherBlend",
+    "WeatherChange",
     "Wind",
     "adapters",
+    "lerp",
+    "load_map",
+    "paint",
+    "paint_mask",
     "presets",
     "quality",
     "save",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
@@ -74,6 +74,9 @@ class Root(Base):
         for field in dataclasses.fields(self):
             value = getattr(self, field.name)
             wanted = field.default_factory
+            if field.name == "weather_mix":
+                object.__setattr__(self, field.name, _mixture(value))
+                continue
             if field.default is None:  # A group that may be missing: the volume.
                 fits = value is None or isinstance(value, DensityGrid)
                 allowed = "DensityGrid or None"
@@ -101,7 +104,7 @@ class Root(Base):
             if not isinstance(old, Block):
                 path, value = next(iter(fields.items()))
                 raise ParameterError(
-                    f"{block}.{path} = {value!r} is not allowed: replace(volume=...) sets it whole"
+                    f"{block}.{path} = {value!r} is not allowed: replace({block}=...) sets it whole"
                 )
             names = [f.name for f in dataclasses.fields(old)]
             for name, value in fields.items():
@@ -110,35 +113,48 @@ class Root(Base):
             new[block] = old.replace(**fields)
         return self.replace(**new)
 
-    def to_dict(self) -> dict[str, dict[str, Any]]:
-        """Return plain values by group and field name; arrays as nested lists."""
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values by group and field name; arrays as nested lists.
+
+        A mixture of weathers is a list of their values, each with its ``weight``.
+        """
         groups = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
-        return {name: group.to_dict() for name, group in groups.items() if group is not None}
+        mixture = groups.pop("weather_mix", ())
+        values = {name: group.to_dict() for name, group in groups.items() if group is not None}
+        if mixture:
+            values["weather_mix"] = [{"weight": w, **weather.to_dict()} for weather, w in mixture]
+        return values
 
     @classmethod
-    def from_dict(cls, values: Mapping[str, Mapping[str, Any]]) -> Self:
+    def from_dict(cls, values: Mapping[str, Any]) -> Self:
         """Make parameters from what `to_dict` returned; fields left out have their defaults."""
         if not isinstance(values, Mapping):
             raise ParameterError(f"values = {values!r} is not allowed: it must be a mapping")
         changes = {}
-        whole = {}
+        whole: dict[str, Any] = {}
         for block, fields in values.items():
+            if block == "weather_mix":
+                whole[block] = _mixture_from_tables(fields)
+                continue
             if not isinstance(fields, Mapping):
                 raise ParameterError(f"{block} = {fields!r} is not allowed: it must be a table")
             if block == "volume":
                 whole[block] = _grid(fields)
                 continue
             for name, value in fields.items():
-                deep = isinstance(value, list) and value and isinstance(value[0], list)
-                changes[f"{block}.{name}"] = _array(block, name, value) if deep else value
-        return cls(**whole).with_(**changes)
+                changes[f"{block}.{name}"] = _plain(block, name, value)
+        # Last, since a mixture must fit the weather that it goes with.
+        return cls().with_(**changes).replace(**whole)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write all parameters to a TOML file."""
         import tomli_w  # here, as `tomllib` below: a first picture need not wait for them
 
+        def given(fields: dict[str, Any]) -> dict[str, Any]:
+            return {name: value for name, value in fields.items() if value is not None}
+
         tables = {
-            block: {name: value for name, value in fields.items() if value is not None}
+            block: [given(f) for f in fields] if isinstance(fields, list) else given(fields)
             for block, fields in self.to_dict().items()
         }
         Path(path).write_text(tomli_w.dumps(tables), encoding="utf-8")
@@ -155,6 +171,55 @@ class Root(Base):
                 f"path = {os.fspath(path)!r} is not allowed: it must be a TOML file ({error})"
             ) from error
         return cls.from_dict(values)
+
+
+def _plain(block: str, name: str, value: Any) -> Any:
+    deep = isinstance(value, list) and value and isinstance(value[0], list)
+    return _array(block, name, value) if deep else value
+
+
+def _mixture(value: Any) -> tuple[tuple[Block, float], ...]:
+    from nubis.params import Weather  # which imports this
+
+    allowed = "a tuple of pairs (nubis.Weather, weight from 0 to 1)"
+    try:
+        pairs = [(weather, weight) for weather, weight in value]
+    except (TypeError, ValueError):
+        raise ParameterError(
+            f"weather_mix = {value!r} is not allowed: it must be {allowed}"
+        ) from None
+    for index, (weather, _) in enumerate(pairs):
+        if not isinstance(weather, Weather):
+            raise ParameterError(
+                f"weather_mix[{index}] = {weather!r} is not allowed: it must be a nubis.Weather"
+            )
+    return tuple(
+        (weather, _nubis.number(f"weather_mix[{i}] weight", w))
+        for i, (weather, w) in enumerate(pairs)
+    )
+
+
+def _mixture_from_tables(tables: Any) -> Sequence[tuple[Block, Any]]:
+    from nubis.params import Weather
+
+    mixture = []
+    if not isinstance(tables, list | tuple):
+        raise ParameterError(
+            f"weather_mix = {tables!r} is not allowed: it must be a list of tables"
+        )
+    for index, table in enumerate(tables):
+        path = f"weather_mix[{index}]"
+        if not isinstance(table, Mapping):
+            raise ParameterError(f"{path} = {table!r} is not allowed: it must be a table")
+        if "weight" not in table:
+            raise ParameterError(f"{path}.weight is missing: a weather of a mixture has a weight")
+        names = [f.name for f in dataclasses.fields(Weather)]
+        for name, value in table.items():
+            if name not in (*names, "weight"):
+                raise _unknown(f"{path}.{name}", value, ["weight", *names])
+        fields = {n: _plain(path, n, v) for n, v in table.items() if n != "weight"}
+        mixture.append((Weather(**fields), table["weight"]))
+    return mixture
 
 
 def _array(block: str, name: str, value: list[Any]) -> np.ndarray[Any, Any]:

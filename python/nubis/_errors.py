@@ -25,4 +25,4 @@ class ForkError(NubisError, RuntimeError):
 
 
 class FileError(NubisError, OSError):
-    """A picture could not be written."""
+    """A file could not be written or read."""

@@ -1,4 +1,4 @@
-"""Linear pictures to screens and files."""
+"""Linear pictures to screens and files, and weather maps from files."""
 
 from __future__ import annotations
 
@@ -82,6 +82,76 @@ def save(
         raise ParameterError(
             f"path = {os.fspath(path)!r} is not allowed: it must end in .png, .exr, .hdr or .npy"
         )
+
+
+def load_map(path: str | os.PathLike[str]) -> npt.NDArray[np.float32]:
+    """Read a weather map from a picture, for `weather.map`.
+
+    Parameters
+    ----------
+    path : path
+        A ``.png`` (8 or 16 bits), ``.exr``, ``.hdr`` or ``.npy`` file. Red is the coverage, green
+        the type, blue the precipitation; one channel is the coverage alone, with type 0.5 and no
+        precipitation. Alpha is left out. Whole numbers are parts of their largest, 255 or 65535,
+        and no gamma is undone; floats are taken as they are.
+
+    Returns
+    -------
+    map : array of float32, shape (H, W, 3)
+        0 to 1; row 0, the top of the picture, is the north.
+
+    Raises
+    ------
+    ParameterError
+        For another ending, a file that is none of these, or values that are not from 0 to 1.
+    FileError
+        When the file cannot be read.
+    """
+    source = Path(path)
+    kind = source.suffix.lower()
+    if kind == ".npy":
+        pixels = _load_array(source)
+    elif kind in (".png", ".exr", ".hdr"):
+        pixels = _nubis.read_pixels(source)
+    else:
+        raise _refused(source, "a path that ends in .png, .exr, .hdr or .npy")
+    bad = pixels[~((pixels >= 0) & (pixels <= 1))]
+    if bad.size:
+        raise _refused(source, f"a map with values from 0 to 1 (it has {bad[0]})")
+    if not (0 < pixels.shape[0] <= 8192 and 0 < pixels.shape[1] <= 8192):
+        raise _refused(source, f"a map of 1 to 8192 rows and columns (it has {pixels.shape[:2]})")
+    if pixels.shape[2] == 1:
+        rest = np.broadcast_to(np.array([0.5, 0.0], np.float32), (*pixels.shape[:2], 2))
+        pixels = np.concatenate([pixels, rest], axis=2)
+    return np.ascontiguousarray(pixels[..., :3], dtype=np.float32)
+
+
+def _load_array(path: Path) -> npt.NDArray[np.float32]:
+    """Shape (H, W, 1) or (H, W, 3)."""
+    try:
+        array = np.load(path, allow_pickle=False)
+    except OSError as error:
+        raise FileError(f"{path}: {error}") from error
+    except (ValueError, EOFError) as error:
+        raise _refused(path, f"a file that numpy.save has written ({error})") from error
+    if not isinstance(array, np.ndarray):
+        raise _refused(path, "a file that numpy.save has written (it is an archive)")
+    if array.dtype in (np.uint8, np.uint16):
+        array = array / np.float32(np.iinfo(array.dtype).max)
+    elif array.dtype.kind != "f":
+        raise _refused(path, f"an array of floats, uint8 or uint16 (it is of {array.dtype})")
+    if array.ndim == 2:
+        array = array[..., None]
+    if array.ndim != 3 or array.shape[2] not in (1, 3, 4):
+        raise _refused(
+            path,
+            f"an array of shape (H, W), (H, W, 1), (H, W, 3) or (H, W, 4) (it is {array.shape})",
+        )
+    return np.asarray(array[..., :3], dtype=np.float32)
+
+
+def _refused(path: Path, allowed: str) -> ParameterError:
+    return ParameterError(f"path = {os.fspath(path)!r} is not allowed: it must be {allowed}")
 
 
 def _straight(image: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:

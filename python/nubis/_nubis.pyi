@@ -21,6 +21,7 @@ __all__ = [
     "clear_cache",
     "number",
     "quality",
+    "read_pixels",
     "to_srgb8",
     "write_exr",
     "write_hdr",
@@ -189,6 +190,9 @@ class Renderer:
     def sun_transmittance(
         self, points: npt.ArrayLike, params: Params, time: float
     ) -> npt.NDArray[np.float32]: ...
+    def weather_map(self, params: Params) -> npt.NDArray[np.float32]:
+        """Coverage, type and precipitation as the march reads them, shape (H, W, 3)."""
+
     def probe(
         self,
         imports: list[str],
@@ -217,6 +221,9 @@ def number(name: str, value: object) -> float:
     """The number that is given for an argument, or `ParameterError`."""
 
 def quality(name: str) -> dict[str, Any]: ...
+def read_pixels(path: str | PathLike[str]) -> npt.NDArray[np.float32]:
+    """The numbers in a PNG, HDR or EXR file, shape (H, W, 1) or (H, W, 3)."""
+
 def to_srgb8(
     frame: npt.NDArray[np.float32], exposure: float, tonemap: str
 ) -> npt.NDArray[np.uint8]: ...

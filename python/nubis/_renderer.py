@@ -290,6 +290,19 @@ class Renderer:
         _check_params(params)
         return self._core.sun_transmittance(points, params, _time(time))
 
+    def weather_map(self, params: Params) -> npt.NDArray[np.float32]:
+        """Return the weather map as the march reads it: baked, your own, or a mixture.
+
+        Returns
+        -------
+        map : array of float32, shape (H, W, 3)
+            Coverage, type and precipitation, 0 to 1, row 0 in the north and column 0 in the west,
+            as `weather.map` takes them: to look at, to paint on (`paint`) or to save. They are
+            half floats on the GPU, exact to 5e-4.
+        """
+        _check_params(params)
+        return self._core.weather_map(params)
+
     def __repr__(self) -> str:
         width, height = self._size
         return f"Renderer({width}, {height}, adapter={self.adapter.name!r})"

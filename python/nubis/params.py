@@ -169,18 +169,27 @@ class Weather(Block):
     Attributes
     ----------
     extent : float
-        Width of the square that one map covers; beyond it the map repeats. Allowed: a number from
-        100 to 10000000 m.
+        Width of the square that one map covers, about the origin of the world. Allowed: a number
+        from 100 to 10000000 m.
+    edge : {repeat, mirror, clamp}
+        What lies beyond that square: the map again, its mirror image, or what is at its edge.
+        Allowed: one of "repeat", "mirror", "clamp".
     map : array of float32, shape (H, W, 3), or None
         A map of your own: coverage, type and precipitation, row 0 in the north; None bakes one from
         noise. Allowed: None or a float array of shape (H, W, 3), H and W from 1 to 8192, values
         from 0 to 1.
+    noise : {worley_perlin, worley_simplex, perlin_worley}
+        Which noises the map is baked from: `worley_simplex` is thesis2018's, `perlin_worley`
+        vsu2022's. Allowed: one of "worley_perlin", "worley_simplex", "perlin_worley".
     seed : int
         Which random weather. Allowed: a whole number from 0 to 4294967295.
     scale : float
         Typical distance between clouds. Allowed: a number from 100 to 1000000 m.
     variety : float
         How much the cover varies over distances of several clouds. Allowed: a number from 0 to 1.
+    type_variety : float
+        How much the type of cloud varies from place to place; 0 makes it the same everywhere.
+        Allowed: a number from 0 to 2.
     broad_variety : float
         How much a second, larger map shifts the weather, by seed or `broad_map`, so that no part of
         the sky looks like another; 0 leaves the first map as it is. The baked one leaves a `map` of
@@ -200,10 +209,13 @@ class Weather(Block):
     """
 
     extent: float = 60000.0
+    edge: Literal["repeat", "mirror", "clamp"] = "repeat"
     map: npt.NDArray[np.float32] | None = None
+    noise: Literal["worley_perlin", "worley_simplex", "perlin_worley"] = "worley_perlin"
     seed: int = 7
     scale: float = 5000.0
     variety: float = 0.5
+    type_variety: float = 0.9
     broad_variety: float = 0.3
     broad_extent: float = 430000.0
     broad_map: npt.NDArray[np.float32] | None = None
@@ -546,6 +558,10 @@ class Params(Root):
         How light becomes colour.
     atmosphere : Atmosphere
         The planet and its air.
+    weather_mix : tuple of (Weather, float)
+        Other weathers and their shares of the weather map: each from 0 to 1, together 1 at most;
+        the rest is that of `weather`. All have the same `extent` and `edge`. Weathers change by it
+        (thesis2018): see `WeatherBlend` and `lerp`.
     volume : DensityGrid or None
         A cloud of your own in place of the procedural ones.
     """
@@ -559,4 +575,5 @@ class Params(Root):
     high_clouds: HighClouds = field(default_factory=HighClouds)
     light: Light = field(default_factory=Light)
     atmosphere: Atmosphere = field(default_factory=Atmosphere)
+    weather_mix: tuple[tuple[Weather, float], ...] = ()
     volume: DensityGrid | None = None

@@ -23,14 +23,15 @@ override LIGHT_CHEAP: bool = true; // there are light samples that do not
 @group(0) @binding(28) var<uniform> quality: Quality;
 @group(0) @binding(2) var repeat_sampler: sampler; // linear, nearest mip, repeats
 @group(0) @binding(3) var clamp_sampler: sampler; // linear, clamps
+@group(0) @binding(42) var weather_sampler: sampler; // linear, beyond the map as weather.edge says
 
 // Baked. All half floats: lavapipe filters those exactly and 8-bit ones to 256 levels only.
 @group(0) @binding(4) var shape_noise: texture_3d<f32>; // base shape: Perlin-Worley, three Worley FBMs (passes/noise)
 @group(0) @binding(5) var detail_noise: texture_3d<f32>; // three Worley FBMs (passes/noise)
 @group(0) @binding(6) var curl_noise: texture_2d<f32>; // a divergence-free vector in xy (passes/noise)
 @group(0) @binding(7) var weather_map: texture_2d<f32>; // coverage, type, precipitation (passes/weather)
-@group(0) @binding(42) var broad_map: texture_2d<f32>; // shifts of those; g and a also bend the smaller map (passes/broad_weather)
-@group(0) @binding(43) var profile_table: texture_2d<f32>; // density by type and height (passes/profile)
+@group(0) @binding(48) var broad_map: texture_2d<f32>; // shifts of those, and what bends the smaller map (passes/broad_weather)
+@group(0) @binding(49) var profile_table: texture_2d<f32>; // density by type and height (passes/profile)
 @group(0) @binding(8) var high_map: texture_2d<f32>; // density of the high clouds (passes/high_clouds)
 @group(0) @binding(9) var sky_map: texture_2d<f32>; // the sky by direction, see SKY_MAP_SCALE (passes/sky)
 @group(0) @binding(10) var<storage, read_write> sky_light: array<vec4f, 4>; // what the sky gives to clouds (passes/sky)
@@ -127,6 +128,11 @@ struct PathRay {
 @group(0) @binding(23) var volume_in: texture_3d<f32>;
 @group(0) @binding(24) var volume_out: texture_storage_3d<rgba16float, write>;
 @group(0) @binding(22) var<storage, read_write> texels_out: array<u32>; // of one channel, two half floats in each
+@group(0) @binding(43) var mix_a: texture_2d<f32>; // weather maps that are mixed
+@group(0) @binding(44) var mix_b: texture_2d<f32>;
+@group(0) @binding(45) var mix_c: texture_2d<f32>;
+@group(0) @binding(46) var mix_d: texture_2d<f32>;
+@group(0) @binding(47) var<uniform> mix_shares: vec4f;
 @group(0) @binding(25) var map_out: texture_storage_2d<rgba16float, write>;
 
 // Queries at points, and probes of shader functions.

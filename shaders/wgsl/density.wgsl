@@ -45,7 +45,7 @@ fn kept_clear(place: vec2f) -> f32 {
     if !KEEP_CLEAR {
         return 1.0;
     }
-    let radius = params.weather.clear_radius;
+    let radius = frame.clear_radius;
     return smoothstep(radius, 1.5 * radius, length(place - frame.clear_at));
 }
 
@@ -130,8 +130,11 @@ fn leant(place: vec2f, altitude: f32) -> vec2f {
     return place - lean * frame.wind_direction;
 }
 
-// What a larger map shifts the weather by, and, by its green and alpha, bends the smaller map, so that it does not look
-// like its own repetition.
+// Which way the larger map bends the smaller one, across and down: along no axis of their tiles.
+const BEND = vec2f(0.8, 0.6);
+
+// What a larger map shifts the weather by, and, in alpha, bends the smaller map by, so that it does not look like its own
+// repetition.
 fn broad_weather(at: vec2f) -> vec4f {
     if BROAD_WEATHER {
         let uv = frame.broad_origin + vec2f(at.x, -at.y) / params.weather.broad_extent;
@@ -142,13 +145,13 @@ fn broad_weather(at: vec2f) -> vec4f {
 
 fn weather_uv(origin: vec2f, at: vec2f, broad: vec4f) -> vec2f {
     let uv = origin + vec2f(at.x, -at.y) / params.weather.extent;
-    return select(uv, uv + frame.broad_bend * broad.ag, BROAD_WEATHER);
+    return select(uv, uv + frame.broad_bend * broad.a * BEND, BROAD_WEATHER);
 }
 
 // The weather map at a place `at` from where the eye is in its tile.
 fn weather_texel(origin: vec2f, at: vec2f, broad: vec4f) -> vec3f {
-    let texel = textureSampleLevel(weather_map, repeat_sampler, weather_uv(origin, at, broad), 0.0).rgb;
-    return select(texel, saturate(texel + params.weather.broad_variety * broad.rgb), BROAD_WEATHER);
+    let texel = textureSampleLevel(weather_map, weather_sampler, weather_uv(origin, at, broad), 0.0).rgb;
+    return select(texel, saturate(texel + frame.broad_scale * broad.rgb), BROAD_WEATHER);
 }
 
 // How much of a cumulonimbus stands where it rains so much: its tower in the core of the rain, its anvil farther around.

@@ -1,6 +1,8 @@
-// Perlin and Worley noise that tile, and their FBMs. Coordinates are in tiles: [0, 1) is one period.
+// Perlin, simplex and Worley noise that tile, and their FBMs. Coordinates are in tiles: [0, 1) is one period.
 #import math
 #import random
+
+const SIMPLEX_GAIN = 7.0; // standard deviations: 0.19 of `perlin`, 0.0275 of `simplex` without it
 
 // Perlin noise of `period` cells a tile, about -1 to 1 (Perlin 2002: quintic fade).
 fn perlin(p: vec3f, period: u32, salt: u32) -> f32 {
@@ -30,6 +32,43 @@ fn perlin_fbm(p: vec3f, period: u32, octaves: u32, salt: u32) -> f32 {
     var total = 0.0;
     for (var i = 0u; i < octaves; i++) {
         sum += amplitude * perlin(p, period << i, salt + i);
+        total += amplitude;
+        amplitude *= 0.5;
+    }
+    return saturate(0.5 + 0.85 * sum / total);
+}
+
+// Simplex noise in the plane (Perlin 2001; made to tile as Gustavson and McEwan do, "Tiling simplex noise and flow noise",
+// JCGT 2022): `period` triangles across a tile, and as many rows of them as make them about equilateral. Each row is
+// shifted by half a triangle against the next, so their number is even. Its variance is that of `perlin`.
+fn simplex(p: vec2f, period: u32, salt: u32) -> f32 {
+    let rows = 2u * max(u32(round(f32(period) / sqrt(3.0))), 1u);
+    let q = fract(p) * vec2f(f32(period), f32(rows));
+    // Where the lattice is square, with the triangles as its halves.
+    let skewed = vec2f(q.x + 0.5 * q.y, q.y);
+    let cell = floor(skewed);
+    let f = skewed - cell;
+    var sum = 0.0;
+    for (var i = 0; i < 3; i++) {
+        let o = select(select(vec2f(0.0, 1.0), vec2f(1.0, 0.0), f.x > f.y), vec2f(f32(i / 2)), i != 1);
+        // From the corner, in sides of a triangle; a corner's weight ends where its six triangles do.
+        let apart = vec2f(f.x - o.x - 0.5 * (f.y - o.y), 0.5 * sqrt(3.0) * (f.y - o.y));
+        let corner = vec2u(cell + o);
+        let wrapped = vec3u((corner.x - corner.y / 2u) % period, corner.y % rows, 0u);
+        let gradient = random3(wrapped, salt).xy * 2.0 - 1.0;
+        let weight = max(0.75 - dot(apart, apart), 0.0);
+        sum += weight * weight * weight * weight * dot(gradient, apart);
+    }
+    return SIMPLEX_GAIN * sum;
+}
+
+// FBM of simplex noise, as `perlin_fbm`.
+fn simplex_fbm(p: vec2f, period: u32, octaves: u32, salt: u32) -> f32 {
+    var sum = 0.0;
+    var amplitude = 1.0;
+    var total = 0.0;
+    for (var i = 0u; i < octaves; i++) {
+        sum += amplitude * simplex(p, period << i, salt + i);
         total += amplitude;
         amplitude *= 0.5;
     }

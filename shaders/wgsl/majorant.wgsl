@@ -10,6 +10,13 @@ struct Majorant {
     reach: f32, // m
 }
 
+// The place in the weather map that is read at `uv`, as its sampler has it.
+fn within_map(uv: vec2f) -> vec2f {
+    let twice = uv - 2.0 * floor(0.5 * uv);
+    let inside = select(uv - floor(uv), min(twice, 2.0 - twice), params.weather.edge == EDGE_MIRROR);
+    return select(inside, saturate(uv), params.weather.edge == EDGE_CLAMP);
+}
+
 // Of a point between base and top, or in the box.
 fn majorant_at(p: vec3f, altitude: f32) -> Majorant {
     let size = vec3f(textureDimensions(majorants));
@@ -23,7 +30,7 @@ fn majorant_at(p: vec3f, altitude: f32) -> Majorant {
         let height = (altitude - frame.shell_base) / thickness;
         let at = leant(p.xy, altitude);
         let uv = weather_uv(frame.weather_origin, at, broad_weather(at));
-        cell = vec3f(uv - floor(uv), height) * size;
+        cell = vec3f(within_map(uv), height) * size;
         // Going up a metre also goes sideways in the map, by the wind's lean, and across by more where the map is bent.
         let lean = abs(params.wind.shear) / (params.clouds.top - params.clouds.base);
         let bend = select(0.0, frame.broad_stretch, BROAD_WEATHER);

@@ -93,6 +93,6 @@ fn thinnest_deck() -> f32 {
 // rim of the spot that is kept clear.
 fn coarsest_panel() -> f32 {
     let texel = select(1.0, params.upper_clouds.scale, UPPER) * params.weather.extent / f32(textureDimensions(weather_map).x);
-    let rim = select(1e30, 0.5 * params.weather.clear_radius, KEEP_CLEAR);
+    let rim = select(1e30, 0.5 * frame.clear_radius, KEEP_CLEAR);
     return max(min(min(thinnest_deck() / 16.0, 2.0 * texel), rim), 2.0 * finest_feature());
 }

@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3, Vec3};
 
 use crate::camera::{Camera, Projection};
 use crate::params;
-use crate::params::Params;
+use crate::params::{Edge, Params};
 use crate::passes::{broad_weather, sun_volume};
 use crate::wind::Carried;
 
@@ -142,6 +142,8 @@ params! {
         sun_direction: [f32; 3] = [0.0, 0.0, 1.0];
         /// The middle of the spot to keep clear, relative to the eye, m.
         clear_at: [f32; 2] = [0.0, 0.0];
+        /// Its radius, m.
+        clear_radius: f32 = 0.0;
         /// Unit vector toward which the wind blows.
         wind_direction: [f32; 2] = [0.0, 1.0];
         /// Where the eye stands in the base shape's tile, after the wind, with the z of altitude 0.
@@ -154,7 +156,11 @@ params! {
         weather_origin: [f32; 2] = [0.0, 0.0];
         /// Where the eye stands in the larger weather map (v down).
         broad_origin: [f32; 2] = [0.0, 0.0];
-        /// By how much of its tile that bends the smaller one, across and down.
+        /// By what its texels are multiplied.
+        broad_scale: f32 = 0.0;
+        /// The most that it shifts anything by.
+        broad_most: f32 = 0.0;
+        /// By how many of its tiles the smaller one is bent where the larger map's alpha is 1.
         broad_bend: f32 = 0.0;
         /// How much longer at most a way in the smaller map becomes by that.
         broad_stretch: f32 = 0.0;
@@ -223,6 +229,18 @@ fn wrap(v: f64, period: f32) -> f32 {
     let fraction = (v / f64::from(period)).rem_euclid(1.0) as f32;
     // Rounding to f32 may give 1.0, which is 0; and a way too long for f64 has no fraction.
     if fraction < 1.0 { fraction } else { 0.0 }
+}
+
+/// Where `v` is on a weather map that is `extent` wide, from 0 to 1 across it, in f64 as `wrap`.
+fn on_map(v: f64, extent: f32, edge: Edge) -> f32 {
+    match edge {
+        Edge::Repeat => wrap(v, extent),
+        // A map and its mirror image repeat together.
+        Edge::Mirror => 2.0 * wrap(0.5 * v, extent),
+        // So far away that f32 does not tell where, no map is in sight; and a way too long for f64 leads nowhere.
+        Edge::Clamp if v.is_nan() => 0.0,
+        Edge::Clamp => (v / f64::from(extent)).clamp(-1e12, 1e12) as f32,
+    }
 }
 
 impl Frame {
@@ -341,7 +359,8 @@ impl Frame {
         // Another part of the map, or one deck would stand on the other.
         let extent = f64::from(params.weather.extent);
         let weather = shape + DVec2::new(0.37, 0.61) * extent * scale;
-        self.upper_weather_origin = plane(DVec2::new(weather.x, -weather.y), params.weather.extent);
+        let (extent, edge) = (params.weather.extent, params.weather.edge);
+        self.upper_weather_origin = [weather.x, -weather.y].map(|v| on_map(v / scale, extent, edge));
     }
 
     fn set_wind(&mut self, eye: DVec3, params: &Params, time: f64) {
@@ -358,19 +377,22 @@ impl Frame {
         // The middle of the weather map is the origin of the world, its first row the north.
         let weather = eye.truncate() - carried.weather;
         let half = 0.5 * f64::from(params.weather.extent);
-        self.weather_origin = plane(DVec2::new(weather.x + half, half - weather.y), params.weather.extent);
+        let (extent, edge) = (params.weather.extent, params.weather.edge);
+        self.weather_origin = [on_map(weather.x + half, extent, edge), on_map(half - weather.y, extent, edge)];
 
         let broad = f64::from(params.weather.broad_extent) * 0.5;
         self.broad_origin = plane(DVec2::new(weather.x + broad, broad - weather.y), params.weather.broad_extent);
-        if params.weather.broad_map.is_none() {
-            self.broad_bend = broad_weather::BEND;
-            let ways = f64::from(broad_weather::BEND * params.weather.extent / params.weather.broad_extent);
-            self.broad_stretch = (ways * broad_weather::STEEPEST) as f32;
-        }
+        let shares = params.broad_shares();
+        self.broad_most = 0.5 * shares.total;
+        self.broad_scale = shares.scale();
+        self.broad_bend = broad_weather::BEND * shares.bend * self.broad_scale;
+        let ways = f64::from(broad_weather::BEND * params.weather.extent / params.weather.broad_extent);
+        self.broad_stretch = (ways * broad_weather::STEEPEST) as f32;
         self.set_upper_wind(eye, params, &carried);
 
-        let spot = DVec2::from_array(params.weather.clear_at.map(f64::from));
-        self.clear_at = (spot - eye.truncate()).as_vec2().to_array();
+        let (spot, radius) = params.clear_spot();
+        self.clear_at = (DVec2::from_array(spot) - eye.truncate()).as_vec2().to_array();
+        self.clear_radius = radius as f32;
 
         let along = compass(f64::from(high.direction));
         let across = DVec2::new(-along.y, along.x);

@@ -11,6 +11,11 @@ pub fn files() -> [(&'static str, String); 2] {
     [("python/nubis/params.py", python()), ("docs/parameters.md", manual())]
 }
 
+/// What the manuals say of the mixture of weathers.
+const WEATHER_MIX: &str = "Other weathers and their shares of the weather map: each from 0 to 1, together 1 at most; the \
+    rest is that of `weather`. All have the same `extent` and `edge`. Weathers change by it (thesis2018): see \
+    `WeatherBlend` and `lerp`.";
+
 fn python_type(field: &Field) -> String {
     match field.ty {
         Type::F32 => "float".into(),
@@ -115,6 +120,8 @@ fn python() -> String {
         let _ = writeln!(out, "    {name} : {}", block.type_name());
         out.push_str(&wrapped(block.doc(), "        "));
     }
+    out.push_str("    weather_mix : tuple of (Weather, float)\n");
+    out.push_str(&wrapped(WEATHER_MIX, "        "));
     out.push_str("    volume : DensityGrid or None\n");
     out.push_str(&wrapped("A cloud of your own in place of the procedural ones.", "        "));
     out.push_str("    \"\"\"\n\n");
@@ -122,6 +129,7 @@ fn python() -> String {
         let ty = block.type_name();
         let _ = writeln!(out, "    {name}: {ty} = field(default_factory={ty})");
     }
+    out.push_str("    weather_mix: tuple[tuple[Weather, float], ...] = ()\n");
     out.push_str("    volume: DensityGrid | None = None\n");
     out
 }
@@ -147,5 +155,9 @@ fn manual() -> String {
             let _ = writeln!(out, "| `{}` | `{value}` | {allowed} | {} |", field.name, about(field));
         }
     }
+    let _ = writeln!(
+        out,
+        "\n## `weather_mix`\n\nA tuple of pairs (`nubis.Weather`, weight), empty by default. {WEATHER_MIX}"
+    );
     out
 }

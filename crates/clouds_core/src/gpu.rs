@@ -142,6 +142,7 @@ pub struct Gpu {
     pub(crate) max_buffer: u64,
     pub(crate) repeat_sampler: wgpu::Sampler,
     pub(crate) clamp_sampler: wgpu::Sampler,
+    pub(crate) mirror_sampler: wgpu::Sampler,
     /// The last noise bake: renderers of the same seed share it.
     pub(crate) noise: Mutex<Option<Arc<Noise>>>,
     kernels: Mutex<HashMap<(String, Variant), Slot>>,
@@ -230,6 +231,7 @@ impl Gpu {
             info,
             repeat_sampler: sampler("repeat_sampler", wgpu::AddressMode::Repeat),
             clamp_sampler: sampler("clamp_sampler", wgpu::AddressMode::ClampToEdge),
+            mirror_sampler: sampler("mirror_sampler", wgpu::AddressMode::MirrorRepeat),
             max_buffer: offered.max_storage_buffer_binding_size.min(offered.max_buffer_size),
             noise: Mutex::new(None),
             kernels: Mutex::new(HashMap::new()),

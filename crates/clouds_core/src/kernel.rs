@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::gpu::Gpu;
-use crate::params::{Model, Params, Quality};
+use crate::params::{Model, Params, Quality, WeatherNoise};
 use crate::shader::Linked;
 use wgpu::naga::{AddressSpace, Module, valid::ModuleInfo};
 
@@ -14,6 +14,7 @@ use wgpu::naga::{AddressSpace, Module, valid::ModuleInfo};
 pub(crate) enum Binding<'a> {
     Buffer(&'a wgpu::Buffer),
     View(&'a wgpu::TextureView),
+    Sampler(&'a wgpu::Sampler),
 }
 
 impl Binding<'_> {
@@ -22,6 +23,7 @@ impl Binding<'_> {
         let texture = match self {
             Self::Buffer(buffer) => return buffer.size(),
             Self::View(view) => view.texture(),
+            Self::Sampler(_) => return 0,
         };
         let texel = u64::from(texture.format().block_copy_size(None).unwrap_or(0));
         let texels = |mip| {
@@ -41,6 +43,12 @@ impl<'a> From<&'a wgpu::Buffer> for Binding<'a> {
 impl<'a> From<&'a wgpu::TextureView> for Binding<'a> {
     fn from(view: &'a wgpu::TextureView) -> Self {
         Self::View(view)
+    }
+}
+
+impl<'a> From<&'a wgpu::Sampler> for Binding<'a> {
+    fn from(sampler: &'a wgpu::Sampler) -> Self {
+        Self::Sampler(sampler)
     }
 }
 
@@ -86,6 +94,8 @@ pub(crate) struct Variant {
     pub cloudless: bool,
     /// Whether the sky and the depth are asked for, for `composite`.
     pub layers: bool,
+    /// Which noises a weather map is baked from, for `weather`.
+    pub weather_noise: WeatherNoise,
 }
 
 impl Variant {
@@ -95,7 +105,7 @@ impl Variant {
         Self {
             model,
             volume: params.volume.is_some(),
-            keep_clear: params.weather.clear_radius > 0.0 && params.volume.is_none(),
+            keep_clear: params.clear_spot().1 > 0.0 && params.volume.is_none(),
             precise: quality.tolerance > 0.0 || model == Model::Path,
             sunlit: true,
             sun_volume: quality.sun_volume && params.volume.is_none(),
@@ -113,6 +123,7 @@ impl Variant {
             high_low_sun: false,
             cloudless: false,
             layers: false,
+            weather_noise: WeatherNoise::WorleyPerlin,
         }
     }
 
@@ -126,7 +137,7 @@ impl Variant {
         Self { sunlit: frame.sunlit(params), camera: frame.camera_kind, ..Self::new(params, quality) }
     }
 
-    fn constants(self) -> [(&'static str, f64); 19] {
+    fn constants(self) -> [(&'static str, f64); 20] {
         let switch = |on| f64::from(u8::from(on));
         [
             ("MODEL", f64::from(self.model as u32)),
@@ -148,6 +159,7 @@ impl Variant {
             ("HIGH_LOW_SUN", switch(self.high_low_sun)),
             ("CLOUDLESS", switch(self.cloudless)),
             ("LAYERS", switch(self.layers)),
+            ("WEATHER_NOISE", f64::from(self.weather_noise as u32)),
         ]
     }
 }
@@ -223,7 +235,7 @@ impl Kernel {
         Ok(Self { label: entry.to_owned(), workgroup, pipeline, layout, variables })
     }
 
-    /// A bind group with each used variable's resource. Samplers bind themselves.
+    /// A bind group with each used variable's resource. Samplers that are not given bind themselves.
     pub(crate) fn bind(&self, gpu: &Gpu, bindings: &[(&str, Binding<'_>)]) -> Result<wgpu::BindGroup> {
         let mut entries = Vec::new();
         for (name, number) in &self.variables {
@@ -231,6 +243,7 @@ impl Kernel {
             let resource = match (given, name.as_str()) {
                 (Some(Binding::Buffer(buffer)), _) => buffer.as_entire_binding(),
                 (Some(Binding::View(view)), _) => wgpu::BindingResource::TextureView(view),
+                (Some(Binding::Sampler(sampler)), _) => wgpu::BindingResource::Sampler(sampler),
                 (None, "repeat_sampler") => wgpu::BindingResource::Sampler(&gpu.repeat_sampler),
                 (None, "clamp_sampler") => wgpu::BindingResource::Sampler(&gpu.clamp_sampler),
                 (None, _) => return Err(Error::Device(format!("{}: nothing bound to {name}", self.label))),

@@ -6,7 +6,7 @@
 use std::sync::Arc;
 
 use crate::error::{Error, Result};
-use crate::schema::{self, Block, Map, Table};
+use crate::schema::{self, Block, Map, Table, Typed as _};
 use crate::volume::DensityGrid;
 use crate::{choice, params};
 
@@ -26,6 +26,30 @@ choice! {
         /// Ever less the denser it is: soft edges and even cores (gems2001's "condensation").
         Exponential = "exponential",
         /// In proportion to what is above a level, up to the thickest (gems2001: subtract and clamp).
+        Clamp = "clamp",
+    }
+}
+
+choice! {
+    /// Which noises the weather map is made of.
+    WeatherNoise {
+        /// Blobs of Worley noise that lean on a Perlin noise.
+        WorleyPerlin = "worley_perlin",
+        /// Worley noise weighed by simplex noise (thesis2018).
+        WorleySimplex = "worley_simplex",
+        /// Perlin-Worley noise (vsu2022).
+        PerlinWorley = "perlin_worley",
+    }
+}
+
+choice! {
+    /// What lies beyond the edge of the weather map.
+    Edge {
+        /// The map again.
+        Repeat = "repeat",
+        /// Its mirror image.
+        Mirror = "mirror",
+        /// The texels of its edge, for ever.
         Clamp = "clamp",
     }
 }
@@ -135,16 +159,22 @@ params! {
 
     /// The weather map: where the clouds stand.
     Weather {
-        /// Width of the square that one map covers; beyond it the map repeats.
+        /// Width of the square that one map covers, about the origin of the world.
         extent: f32 = 60000.0, in 100..=10000000 "m";
+        /// What lies beyond that square: the map again, its mirror image, or what is at its edge.
+        edge: Edge = Edge::Repeat;
         /// A map of your own: coverage, type and precipitation, row 0 in the north; None bakes one from noise.
         map: Option<Arc<Map>> = None, in 0..=1 "";
+        /// Which noises the map is baked from: `worley_simplex` is thesis2018's, `perlin_worley` vsu2022's.
+        noise: WeatherNoise = WeatherNoise::WorleyPerlin;
         /// Which random weather.
         seed: u32 = 7, in 0..=4294967295.0 "";
         /// Typical distance between clouds.
         scale: f32 = 5000.0, in 100..=1000000 "m";
         /// How much the cover varies over distances of several clouds.
         variety: f32 = 0.5, in 0..=1 "";
+        /// How much the type of cloud varies from place to place; 0 makes it the same everywhere.
+        type_variety: f32 = 0.9, in 0..=2 "";
         /// How much a second, larger map shifts the weather, by seed or `broad_map`, so that no part of the sky looks like
         /// another; 0 leaves the first map as it is. The baked one leaves a `map` of yours alone.
         broad_variety: f32 = 0.3, in 0..=1 "";
@@ -338,8 +368,38 @@ pub struct Params {
     pub high_clouds: HighClouds,
     pub light: Light,
     pub atmosphere: Atmosphere,
+    /// Other weathers and their shares of the weather map, each 0 to 1 and 1 together at most; the rest is that of
+    /// `weather`. All cover the same square.
+    pub weather_mix: Vec<(Weather, f32)>,
     /// A cloud of the user's own in place of the procedural ones.
     pub volume: Option<Arc<DensityGrid>>,
+}
+
+/// A larger weather map.
+#[derive(Clone, Debug, PartialEq)]
+pub enum BroadSource {
+    /// Baked from noise.
+    Seed(u32),
+    /// The user's.
+    Own(Arc<Map>),
+}
+
+/// What the larger weather map is made of.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BroadShares {
+    /// Maps and their weights: the share of a weather times its variety.
+    pub maps: Vec<(BroadSource, f32)>,
+    /// The sum of the weights.
+    pub total: f32,
+    /// How much the smaller map is bent, for each weight of a baked map: 1 in all where every weather has one.
+    pub bend: f32,
+}
+
+impl BroadShares {
+    /// What the texels are multiplied with: of a mixture they hold their weights.
+    pub fn scale(&self) -> f32 {
+        if let [(_, only)] = self.maps[..] { only } else { 1.0 }
+    }
 }
 
 impl Params {
@@ -404,6 +464,39 @@ impl Params {
                 format!("at or above clouds.top = {} m where upper_clouds.coverage is not 0", self.clouds.top);
             return Err(Error::parameter("upper_clouds.base", upper.base, allowed));
         }
+        self.check_mix()
+    }
+
+    fn check_mix(&self) -> Result<()> {
+        let mut sum = 0.0;
+        for (index, (weather, share)) in self.weather_mix.iter().enumerate() {
+            let path = format!("weather_mix[{index}]");
+            check_block(&path, weather)?;
+            // Written so that NaN fails it.
+            if !(*share >= 0.0 && *share <= 1.0) {
+                return Err(Error::parameter(&format!("{path} weight"), share, "a number from 0 to 1"));
+            }
+            sum += f64::from(*share);
+            let (extent, edge) = (self.weather.extent, self.weather.edge.to_value());
+            if weather.extent != extent {
+                let allowed = format!("weather.extent = {extent} m, as of all weathers of a mixture");
+                return Err(Error::parameter(&format!("{path}.extent"), weather.extent, allowed));
+            }
+            let broad_extent = self.weather.broad_extent;
+            if weather.broad_extent != broad_extent {
+                let allowed = format!("weather.broad_extent = {broad_extent} m, as of all weathers of a mixture");
+                return Err(Error::parameter(&format!("{path}.broad_extent"), weather.broad_extent, allowed));
+            }
+            if weather.edge.to_value() != edge {
+                let allowed = format!("weather.edge = {edge}, as of all weathers of a mixture");
+                return Err(Error::parameter(&format!("{path}.edge"), weather.edge.to_value(), allowed));
+            }
+        }
+        // Shares that are 1 in sum may pass it by their rounding.
+        if sum > 1.0 + 1e-5 {
+            let allowed = "weights of at most 1 together: the rest is that of weather";
+            return Err(Error::parameter("weather_mix", format!("weights of {sum} together"), allowed));
+        }
         Ok(())
     }
 
@@ -429,8 +522,54 @@ impl Params {
 
     /// Whether a second, larger map shifts the weather.
     pub fn has_broad_weather(&self) -> bool {
-        let weather = &self.weather;
-        self.volume.is_none() && weather.broad_variety > 0.0 && (weather.map.is_none() || weather.broad_map.is_some())
+        self.volume.is_none() && self.broad_shares().total > 0.0
+    }
+
+    /// The spot to keep clear, its middle and its radius in m: of a mixture one that grows in its place.
+    pub fn clear_spot(&self) -> ([f64; 2], f64) {
+        let mixed: f32 = self.weather_mix.iter().map(|(_, share)| share).sum();
+        let all = self.weather_mix.iter().map(|(weather, share)| (weather, *share));
+        let (mut middle, mut radius) = ([0.0; 2], 0.0);
+        for (weather, share) in std::iter::once((&self.weather, (1.0 - mixed).max(0.0))).chain(all) {
+            let part = f64::from(share) * f64::from(weather.clear_radius);
+            radius += part;
+            for (sum, at) in middle.iter_mut().zip(weather.clear_at) {
+                *sum += part * f64::from(at);
+            }
+        }
+        if radius > 0.0 { (middle.map(|sum| sum / radius), radius) } else { ([0.0; 2], 0.0) }
+    }
+
+    /// What the larger map is made of.
+    pub fn broad_shares(&self) -> BroadShares {
+        let mixed: f32 = self.weather_mix.iter().map(|(_, share)| share).sum();
+        let all = self.weather_mix.iter().map(|(weather, share)| (weather, *share));
+        let mut shares = BroadShares { maps: Vec::new(), total: 0.0, bend: 0.0 };
+        let mut baked = 0.0;
+        for (weather, share) in std::iter::once((&self.weather, (1.0 - mixed).max(0.0))).chain(all) {
+            let source = match (&weather.broad_map, &weather.map) {
+                (Some(map), _) => BroadSource::Own(map.clone()),
+                (None, None) => BroadSource::Seed(weather.seed),
+                // One that is composed stays as it is.
+                (None, Some(_)) => continue,
+            };
+            let weight = share * weather.broad_variety;
+            if weight <= 0.0 {
+                continue;
+            }
+            if let BroadSource::Seed(_) = source {
+                shares.bend += share;
+                baked += weight;
+            }
+            shares.total += weight;
+            match shares.maps.iter_mut().find(|(known, _)| *known == source) {
+                Some((_, sum)) => *sum += weight,
+                None => shares.maps.push((source, weight)),
+            }
+        }
+        // The weights are on the bend as on the shifts.
+        shares.bend = if baked > 0.0 { shares.bend / baked } else { 0.0 };
+        shares
     }
 
     /// The lowest and the highest altitude at which there can be procedural clouds or visible rain, m.
@@ -446,13 +585,36 @@ impl Params {
         };
         if self.has_upper_clouds() { [lower[0], lower[1].max(upper.top)] } else { lower }
     }
+
+    /// What the weather map is made of: maps by what they depend on, and their shares, which are 1 together.
+    pub fn weather_shares(&self) -> Vec<(Weather, f32)> {
+        let mixed: f32 = self.weather_mix.iter().map(|(_, share)| share).sum();
+        let mut shares: Vec<(Weather, f32)> = Vec::new();
+        let all = self.weather_mix.iter().map(|(weather, share)| (weather, *share));
+        for (weather, share) in std::iter::once((&self.weather, (1.0 - mixed).max(0.0))).chain(all) {
+            let source = weather.source();
+            match shares.iter_mut().find(|(known, _)| *known == source) {
+                Some((_, sum)) => *sum += share,
+                None => shares.push((source, share)),
+            }
+        }
+        // Half floats do not tell less.
+        shares.retain(|(_, share)| *share > 1e-6);
+        shares
+    }
 }
 
 impl Weather {
-    /// What the map is made from: the spot to keep clear is none of it.
-    pub fn map_only(&self) -> Self {
-        let Self { clear_at, clear_radius, .. } = Self::default();
-        Self { clear_at, clear_radius, ..self.clone() }
+    /// The weather with what its map does not depend on at the default.
+    fn source(&self) -> Self {
+        let default = Self::default();
+        match &self.map {
+            Some(map) => Self { map: Some(map.clone()), ..default },
+            None => {
+                let Self { edge, broad_variety, broad_extent, broad_map, clear_at, clear_radius, .. } = default;
+                Self { edge, broad_variety, broad_extent, broad_map, clear_at, clear_radius, ..self.clone() }
+            }
+        }
     }
 }
 
@@ -543,8 +705,19 @@ fn check_block(name: &str, block: &dyn Block) -> Result<()> {
 
 /// A block by the name that Python calls its type: every block of [`Params`], and [`Quality`].
 pub fn block(type_name: &str) -> Option<Box<dyn Block>> {
-    let Params { sun, clouds, upper_clouds, weather, wind, wander, high_clouds, light, atmosphere, volume: _ } =
-        Params::default();
+    let Params {
+        sun,
+        clouds,
+        upper_clouds,
+        weather,
+        wind,
+        wander,
+        high_clouds,
+        light,
+        atmosphere,
+        weather_mix: _,
+        volume: _,
+    } = Params::default();
     let quality = Quality::default();
     let blocks: [Box<dyn Block>; 10] = [
         Box::new(sun),

@@ -13,8 +13,8 @@ use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::gpu::{Gpu, Interrupt, Timings, Work, check_fork};
-use crate::kernel::{Kernel, Variant, Wanted};
-use crate::params::{Model, Params, Quality};
+use crate::kernel::{Binding, Kernel, Variant, Wanted};
+use crate::params::{self, Model, Params, Quality};
 use crate::passes::broad_weather::BroadWeather;
 use crate::passes::composite::Composed;
 use crate::passes::high_clouds::{self, HighClouds};
@@ -492,6 +492,27 @@ impl Renderer {
         Ok(answers.iter().map(|answer| answer[0]).collect())
     }
 
+    /// The weather map as the march reads it, baked, the user's own or mixed: its width and height in texels, and three
+    /// numbers for each of them, coverage, type and precipitation, row 0 in the north.
+    pub fn weather_map(&mut self, params: &Params, interrupt: Interrupt<'_>) -> Result<([u32; 2], Vec<f32>)> {
+        let (frame, params) = self.begin(&Camera::equirect(DVec3::ZERO)?, params, 0.0)?;
+        let params = &params;
+        let Self { gpu, world, quality, timings, .. } = self;
+        world.uniforms.upload(gpu, params, &frame, quality);
+        let mut ctx = Context { gpu, uniforms: &world.uniforms, variant: Variant::bake(), timings, interrupt };
+        let texture = world.weather.texture(&mut ctx, params)?;
+        let mut work = gpu.work();
+        work.download_texture(&texture);
+        let downloads = work.submit(timings, interrupt)?;
+        let (width, height) = (texture.width() as usize, texture.height() as usize);
+        let halves: &[half::f16] = downloads[0].numbers();
+        // Rows are padded.
+        let rows = halves.chunks_exact(halves.len() / height).map(|row| &row[..4 * width]);
+        let texels = rows.flat_map(|row| row.chunks_exact(4));
+        let numbers = texels.flat_map(|texel| [texel[0], texel[1], texel[2]]).map(half::f16::to_f32);
+        Ok(([texture.width(), texture.height()], numbers.collect()))
+    }
+
     /// The value of a WGSL `expression` of `x: vec4f` for each input, with the shaders named by `imports` in scope and
     /// the eye at the origin: how tests reach single shader functions.
     pub fn probe(
@@ -607,8 +628,8 @@ impl World {
         let mut ctx = Context { gpu, uniforms: &self.uniforms, variant: Variant::bake(), timings, interrupt };
 
         let noise = self.noise.insert(Noise::run(&mut ctx, params)?); // once for a seed
-        let weather = self.weather.run(&mut ctx, params)?; // when its block changes
-        let broad_weather = self.broad_weather.run(&mut ctx, params)?; // for a seed, or once for a map
+        let weather = self.weather.run(&mut ctx, params)?; // when its block or the mixture changes
+        let broad_weather = self.broad_weather.run(&mut ctx, params)?; // when the larger map or its shares change
         let profile = self.profile.run(&ctx, params)?; // once for a table
         let high_clouds = self.high_clouds.run(&mut ctx, params, frame)?; // as they evolve
         let sky = self.sky.run(&mut ctx, params, frame, at.0)?; // when sun or air change, or the eye has gone far
@@ -625,7 +646,8 @@ impl World {
         bindings.extend(majorants);
         let sun_volume = self.sun_volume.run(&mut ctx, params, frame, at, &bindings)?; // as clouds and eye move
         bindings.extend(sun_volume);
-        self.memory = bindings.iter().map(|(name, binding)| (*name, binding.bytes())).collect();
+        let held = bindings.iter().filter(|(_, binding)| !matches!(binding, Binding::Sampler(_)));
+        self.memory = held.map(|(name, binding)| (*name, binding.bytes())).collect();
         Ok(Scene { uniforms: &self.uniforms, variant, bindings })
     }
 }
@@ -659,11 +681,27 @@ impl Shot {
             || turned
             || jumped
             || (old.clouds.seed, old.clouds.noise) != (new.clouds.seed, new.clouds.noise)
-            || old.weather.map_only() != new.weather.map_only()
+            || (old.weather.extent, old.weather.edge) != (new.weather.extent, new.weather.edge)
+            || old.weather.broad_extent != new.weather.broad_extent
+            || weather_change(old, new) > MOST_WEATHER_CHANGE
             || old.volume != new.volume
             || old.light.model != new.light.model
             || old.atmosphere.planet_radius != new.atmosphere.planet_radius
     }
+}
+
+/// Largest share of the weather map that may change from one frame to the next without a cut: a third within the sixteen
+/// frames in which every pixel is marched anew. A change in thirty seconds (thesis2018) is that slow from two frames a
+/// second on.
+const MOST_WEATHER_CHANGE: f32 = 0.02;
+
+/// The share of the weather map that is another.
+fn weather_change(old: &Params, new: &Params) -> f32 {
+    let old = old.weather_shares();
+    let kept = |(weather, share): (params::Weather, f32)| {
+        old.iter().find(|(before, _)| *before == weather).map_or(0.0, |(_, before)| before.min(share))
+    };
+    1.0 - new.weather_shares().into_iter().map(kept).sum::<f32>()
 }
 
 /// What a submission should take, in seconds: short enough for every GPU's watchdog and for Ctrl-C, long enough that

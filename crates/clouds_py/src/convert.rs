@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use clouds_core::Error;
-use clouds_core::params::{Params, Quality};
+use clouds_core::params::{Params, Quality, Weather};
 use clouds_core::schema::{self, Block, Map, Value};
 use glam::DVec3;
 use numpy::{PyArray1, PyArrayMethods as _, PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods as _};
@@ -124,6 +124,12 @@ pub fn params_from_python(object: &Bound<'_, PyAny>) -> PyResult<Params> {
     let mut params = Params::default();
     for (name, block) in params.blocks_mut() {
         fill(block, name, &object.getattr(name)?)?;
+    }
+    for (index, pair) in object.getattr("weather_mix")?.try_iter()?.enumerate() {
+        let (weather, share): (Bound<'_, PyAny>, f64) = pair?.extract()?;
+        let mut block = Weather::default();
+        fill(&mut block, &format!("weather_mix[{index}]"), &weather)?;
+        params.weather_mix.push((block, share as f32));
     }
     let volume = object.getattr("volume")?;
     if !volume.is_none() {

@@ -484,6 +484,12 @@ impl Renderer {
         Ok(PyArray1::from_vec(py, answers))
     }
 
+    fn weather_map<'py>(&self, py: Python<'py>, params: &Bound<'_, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        let params: Params = params_from_python(params)?;
+        let ([width, height], texels) = detached(py, |interrupt| lock(&self.core).weather_map(&params, interrupt))?;
+        array(py, texels, &[height as usize, width as usize, 3])
+    }
+
     fn probe<'py>(
         &self,
         py: Python<'py>,
@@ -605,6 +611,13 @@ fn write_hdr(py: Python<'_>, path: PathBuf, frame: PyReadonlyArrayDyn<'_, f32>) 
     raise(py, files::write_hdr(&path, frame.as_slice()?, [shape[1], shape[0]], shape[2]))
 }
 
+/// The numbers in a PNG, HDR or EXR file.
+#[pyfunction]
+fn read_pixels(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyAny>> {
+    let pixels = raise(py, files::read_pixels(&path))?;
+    array(py, pixels.data, &[pixels.size[1], pixels.size[0], pixels.channels])
+}
+
 /// The folder of the cache, None where it is off, and how many bytes are in it.
 #[pyfunction]
 fn cache_usage() -> (Option<PathBuf>, u64) {
@@ -621,6 +634,6 @@ mod _nubis {
     #[pymodule_export]
     use super::{
         Camera, DensityGrid, Renderer, adapters, cache_usage, check, check_params, check_quality, clear_cache, number,
-        quality, to_srgb8, write_exr, write_hdr, write_png,
+        quality, read_pixels, to_srgb8, write_exr, write_hdr, write_png,
     };
 }

@@ -1,4 +1,4 @@
-// Bakes the larger weather map: what it shifts coverage, type and precipitation by; green and alpha also bend the smaller map.
+// Bakes the larger weather map: what it shifts coverage, type and precipitation by, and, in alpha, bends the smaller map by.
 #import bindings
 #import gradient_noise
 
@@ -24,6 +24,7 @@ fn broad_noise(p: vec3f) -> vec4f {
         perlin_fbm(p, 2u * BROAD_CELLS, 2u, salt),
         perlin_fbm(p, BROAD_CELLS, 2u, salt + 8u),
         perlin_fbm(p, 2u * BROAD_CELLS, 2u, salt + 16u),
-        perlin_fbm(p, BROAD_CELLS, 2u, salt + 24u),
+        // Of no seed: were it of one, the clouds would slide where one weather changes to another.
+        perlin_fbm(p, BROAD_CELLS, 2u, BROAD_SALT + 24u),
     );
 }

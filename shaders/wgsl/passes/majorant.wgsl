@@ -45,9 +45,8 @@ fn majorant_weather(@builtin(global_invocation_id) id: vec3u) {
         }
     }
     if BROAD_WEATHER {
-        // It shifts each by at most half of that.
-        most = saturate(most + 0.5 * params.weather.broad_variety);
-        least = saturate(least - 0.5 * params.weather.broad_variety);
+        most = saturate(most + frame.broad_most);
+        least = saturate(least - frame.broad_most);
     }
     let wettest = weather_from_map(most);
     let driest = weather_from_map(least);
@@ -77,8 +76,10 @@ fn majorant_weather(@builtin(global_invocation_id) id: vec3u) {
     textureStore(volume_out, id, vec4f(ROUND_UP * bound));
 }
 
+// What lies beyond the edge of the weather map; beside its edge its mirror image begins with the same texels.
 fn wrapped(at: vec2i, size: vec2i) -> vec2i {
-    return ((at % size) + size) % size;
+    let repeated = ((at % size) + size) % size;
+    return select(clamp(at, vec2i(0), size - 1), repeated, params.weather.edge == EDGE_REPEAT);
 }
 
 // The largest value of `height_profile` between two heights and two types, where it rains so much or less.
@@ -106,7 +107,7 @@ fn largest_profile(heights: vec2f, kinds: vec2f, rain: f32) -> f32 {
     return rise * (1.0 - smoothstep(last.z, max(last.w, last.z + 1e-4), heights.x));
 }
 
-// The largest of a cell and its neighbours. The weather map repeats.
+// The largest of a cell and its neighbours.
 @compute @workgroup_size(4, 4, 4)
 fn majorant_dilate(@builtin(global_invocation_id) id: vec3u) {
     let size = vec3i(textureDimensions(volume_out));

@@ -1,10 +1,43 @@
-// Bakes the weather map: coverage, type and precipitation over a square that repeats (nubis2015, thesis2018).
+// Bakes the weather map: coverage, type and precipitation over a square that repeats (nubis2015, thesis2018, vsu2022);
+// and mixes such maps.
 #import bindings
 #import gradient_noise
 
 const COVERAGE_SALT = 7u;
 const TYPE_SALT = 47u;
 const RAIN_SALT = 77u;
+
+// weather.noise; the others are compiled out.
+override WEATHER_NOISE: u32 = 0u;
+
+// The smooth noise that a map is made with.
+fn smooth_fbm(p: vec3f, period: u32, octaves: u32, salt: u32) -> f32 {
+    if WEATHER_NOISE == NOISE_WORLEY_SIMPLEX {
+        return simplex_fbm(p.xy, period, octaves, salt);
+    }
+    return perlin_fbm(p, period, octaves, salt);
+}
+
+// Three octaves of Worley noise.
+fn worley_fbm(p: vec3f, period: u32, salt: u32) -> f32 {
+    return fbm3(vec3f(worley(p, period, salt), worley(p, period * 2u, salt + 1u), worley(p, period * 4u, salt + 2u)));
+}
+
+// Where clouds stand, before it is spread over 0 to 1; and what becomes 0 and 1, so that all noises cover alike.
+fn cover(p: vec3f, cells: u32, seed: u32) -> vec3f {
+    let shape = smooth_fbm(p, cells, 4u, seed + 2u);
+    if WEATHER_NOISE == NOISE_WORLEY_SIMPLEX {
+        // Clouds stand where simplex noise is high, and are cut by the borders of Worley's cells.
+        return vec3f(worley_fbm(p, cells, seed) * (0.2 + 1.6 * shape), 0.2, 0.75);
+    }
+    if WEATHER_NOISE == NOISE_PERLIN_WORLEY {
+        let blobs = remap01(worley_fbm(p, cells, seed), 0.1, 0.65);
+        return vec3f(perlin_worley(shape, blobs), -0.05, 0.6);
+    }
+    // Clouds stand where Worley's blobs are, and lean on a Perlin noise so that no two are alike.
+    let blobs = worley(p, cells, seed) * 0.6 + worley(p, cells * 2u, seed + 1u) * 0.4;
+    return vec3f(0.9 * blobs + 0.7 * (shape - 0.5), 0.2, 0.7);
+}
 
 @compute @workgroup_size(8, 8)
 fn weather(@builtin(global_invocation_id) id: vec3u) {
@@ -18,14 +51,27 @@ fn weather(@builtin(global_invocation_id) id: vec3u) {
     let cells = max(u32(round(params.weather.extent / params.weather.scale)), 1u);
     let broad_cells = max(cells / 4u, 1u);
 
-    // Clouds stand where Worley's blobs are, and lean on a Perlin noise so that no two are alike.
-    let blobs = worley(p, cells, seed + COVERAGE_SALT) * 0.6 + worley(p, cells * 2u, seed + COVERAGE_SALT + 1u) * 0.4;
-    let shape = perlin_fbm(p, cells, 4u, seed + COVERAGE_SALT + 2u);
-    let broad = perlin_fbm(p, broad_cells, 3u, seed + COVERAGE_SALT + 9u) - 0.5;
-    let sum = 0.9 * blobs + 0.7 * (shape - 0.5) + params.weather.variety * broad;
-    let coverage = remap01(sum, 0.2, 0.7);
+    let stands = cover(p, cells, seed + COVERAGE_SALT);
+    let broad = smooth_fbm(p, broad_cells, 3u, seed + COVERAGE_SALT + 9u) - 0.5;
+    let coverage = remap01(stands.x + params.weather.variety * broad, stands.y, stands.z);
 
-    let kind = saturate(0.5 + 0.9 * (perlin_fbm(p, max(cells / 3u, 1u), 3u, seed + TYPE_SALT) - 0.5));
-    let rain = remap01(perlin_fbm(p, broad_cells, 2u, seed + RAIN_SALT) + 0.3 * (coverage - 0.5), 0.3, 0.7);
+    let varied = smooth_fbm(p, max(cells / 3u, 1u), 3u, seed + TYPE_SALT) - 0.5;
+    let kind = saturate(0.5 + params.weather.type_variety * varied);
+    let rain = remap01(smooth_fbm(p, broad_cells, 2u, seed + RAIN_SALT) + 0.3 * (coverage - 0.5), 0.3, 0.7);
     textureStore(map_out, id.xy, vec4f(coverage, kind, rain, 1.0));
+}
+
+// The weighted sum of up to four maps, each as large as the march would read it: what is small is magnified.
+@compute @workgroup_size(8, 8)
+fn weather_mix(@builtin(global_invocation_id) id: vec3u) {
+    let size = textureDimensions(map_out);
+    if any(id.xy >= size) {
+        return;
+    }
+    let uv = (vec2f(id.xy) + 0.5) / vec2f(size);
+    var sum = mix_shares.x * textureSampleLevel(mix_a, weather_sampler, uv, 0.0);
+    sum += mix_shares.y * textureSampleLevel(mix_b, weather_sampler, uv, 0.0);
+    sum += mix_shares.z * textureSampleLevel(mix_c, weather_sampler, uv, 0.0);
+    sum += mix_shares.w * textureSampleLevel(mix_d, weather_sampler, uv, 0.0);
+    textureStore(map_out, id.xy, sum);
 }

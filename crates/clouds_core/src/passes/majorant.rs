@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{Baked, Bindings, Context, weather};
 use crate::error::Result;
-use crate::params::{self, Model, Params};
+use crate::params::{self, BroadShares, Edge, Model, Params};
 
 /// Voxels along the side of a cell (as in majorant.wgsl).
 const BRICK: usize = 4;
@@ -15,7 +15,7 @@ const CELL_HEIGHT: f32 = 125.0;
 const TEXELS: u32 = 8;
 
 /// What the majorants are made from: the grid by its address, or weather and cover.
-type Key = (bool, usize, params::Weather, params::Clouds, params::UpperClouds);
+type Key = (bool, usize, (Vec<(params::Weather, f32)>, Edge, BroadShares), params::Clouds, params::UpperClouds);
 
 /// The majorants on the GPU.
 pub(crate) struct Majorants {
@@ -31,13 +31,14 @@ impl Majorants {
     pub fn run(&mut self, ctx: &mut Context<'_>, params: &Params, world: &Bindings<'_>) -> Result<Bindings<'_>> {
         let wanted = ctx.variant.model == Model::Path;
         let grid = params.volume.as_ref().map_or(0, |grid| Arc::as_ptr(grid) as usize);
-        let key = (wanted, grid, params.weather.map_only(), params.clouds.clone(), params.upper_clouds.clone());
+        let weather = (params.weather_shares(), params.weather.edge, params.broad_shares());
+        let key = (wanted, grid, weather, params.clouds.clone(), params.upper_clouds.clone());
         let view = self.made.get(key, || {
             let (entry, size) = match &params.volume {
                 _ if !wanted => ("", [1; 3]),
                 Some(grid) => ("majorant_grid", grid.size().map(|n| n.div_ceil(BRICK) as u32)),
                 None => {
-                    let across = weather::size(&params.weather).map(|n| n.div_ceil(TEXELS).clamp(1, CELLS));
+                    let across = weather::size(params).map(|n| n.div_ceil(TEXELS).clamp(1, CELLS));
                     let [base, top] = params.shell();
                     let up = (((top - base) / CELL_HEIGHT) as u32).clamp(16, 64);
                     ("majorant_weather", [across[0], across[1], up])
@@ -50,7 +51,8 @@ impl Majorants {
                 let (from, to) = (view(&bounds), view(&dilated));
                 let bindings = [world.as_slice(), &[("volume_out", (&from).into())]].concat();
                 work.dispatch(&*ctx.gpu.kernel("majorant", entry, ctx.variant)?, &bindings, size)?;
-                let bindings = [("volume_in", (&from).into()), ("volume_out", (&to).into())];
+                let bindings =
+                    [world.as_slice(), &[("volume_in", (&from).into()), ("volume_out", (&to).into())]].concat();
                 work.dispatch(&*ctx.gpu.kernel("majorant", "majorant_dilate", ctx.variant)?, &bindings, size)?;
                 work.submit(ctx.timings, ctx.interrupt)?;
             }

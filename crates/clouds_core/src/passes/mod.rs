@@ -63,11 +63,16 @@ impl Uniforms {
     }
 
     pub fn upload(&self, gpu: &Gpu, params: &Params, frame: &Frame, quality: &Quality) {
-        gpu.queue.write_buffer(&self.params, 0, bytemuck::cast_slice(&params::uniform(params)));
+        self.upload_params(gpu, params);
         let mut words = vec![0; schema::size(Quality::FIELDS) / 4];
         quality.write(&mut words);
         gpu.queue.write_buffer(&self.quality, 0, bytemuck::cast_slice(&words));
         self.upload_frame(gpu, frame);
+    }
+
+    /// For a bake from parameters that are not the picture's.
+    pub fn upload_params(&self, gpu: &Gpu, params: &Params) {
+        gpu.queue.write_buffer(&self.params, 0, bytemuck::cast_slice(&params::uniform(params)));
     }
 
     /// For the next band of the same picture.

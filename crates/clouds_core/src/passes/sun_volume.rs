@@ -24,7 +24,7 @@ type Key = (
     bool,
     [f32; 2],
     (params::Clouds, params::UpperClouds),
-    params::Weather,
+    (params::Weather, Vec<(params::Weather, f32)>),
     (params::Wind, params::Wander),
     f32,
     [i64; 3],
@@ -82,7 +82,8 @@ impl SunVolume {
         let origin = Origin::new(eye, params, time);
         let sun = [params.sun.elevation, params.sun.azimuth];
         let radius = params.atmosphere.planet_radius;
-        let (clouds, weather) = ((params.clouds.clone(), params.upper_clouds.clone()), params.weather.clone());
+        let clouds = (params.clouds.clone(), params.upper_clouds.clone());
+        let weather = (params.weather.clone(), params.weather_mix.clone());
         let wind = (params.wind.clone(), params.wander.clone());
         let key = (wanted, sun, clouds, weather, wind, radius, origin.steps);
         let view = self.made.get(key, || {

@@ -1,0 +1,236 @@
+"""Clouds by hand: strokes of a soft brush on a weather map."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from typing import Any, Literal, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from nubis import _nubis
+from nubis._errors import ParameterError
+
+Channel = Literal["coverage", "type", "precipitation"]
+Mode = Literal["add", "set", "multiply"]
+Edge = Literal["repeat", "mirror", "clamp"]
+Map = npt.NDArray[np.float32]
+
+
+def paint(
+    map: npt.ArrayLike,
+    at: npt.ArrayLike,
+    radius: float,
+    *,
+    extent: float,
+    channel: Channel = "coverage",
+    amount: float = 1.0,
+    hardness: float = 0.5,
+    mode: Mode = "add",
+    edge: Edge = "repeat",
+) -> Map:
+    """Return a weather map with a stroke of a soft brush painted on it.
+
+    The cloud appears over the place in the world at time 0, and drifts with the weather's wind. A
+    stroke with ``mode="set", amount=0`` keeps a place clear, while `clouds.coverage`, which shifts
+    the whole map, is 0.5 or less.
+
+    Parameters
+    ----------
+    map : array-like, shape (H, W, 3)
+        Coverage, type and precipitation, 0 to 1, row 0 in the north: your own, from `load_map` or
+        from `Renderer.weather_map`. It stays as it is.
+    at : (2,) or (N, 2) floats
+        World metres, x east and y north of the middle of the map: a dab, or the corners of a path.
+        A path is one stroke: where it crosses itself it paints once.
+    radius : float
+        Metres to where the brush ends, at most `extent`.
+    extent : float
+        `weather.extent` of the map, in metres.
+    channel : {"coverage", "type", "precipitation"}
+    amount : float
+        What is added (-1 to 1), set (0 to 1) or multiplied by (from 0) in the middle of the brush.
+    hardness : float
+        Share of the radius in which the brush is at its full strength, 0 to 1; from there it falls
+        smoothly to the radius.
+    mode : {"add", "set", "multiply"}
+    edge : {"repeat", "mirror", "clamp"}
+        `weather.edge` of the map: whether a stroke beyond the edge comes back in, as the map does
+        in the sky. With ``"clamp"`` what lies beyond paints nothing.
+
+    Returns
+    -------
+    map : array of float32, shape (H, W, 3)
+        From 0 to 1 again.
+    """
+    texels = _map(map)
+    path = _path(at)
+    width = _number("extent", extent, 100.0, 1e7, "m")
+    reach = _number("radius", radius, 1e-3, width, "m")
+    hard = _number("hardness", hardness, 0.0, 1.0)
+    _one_of("edge", edge, Edge)
+    mask = _stroke(texels.shape[:2], path, reach, width, hard, edge)
+    return paint_mask(texels, mask, channel=channel, amount=amount, mode=mode)
+
+
+def paint_mask(
+    map: npt.ArrayLike,
+    mask: npt.ArrayLike,
+    *,
+    channel: Channel = "coverage",
+    amount: float = 1.0,
+    mode: Mode = "add",
+) -> Map:
+    """Return a weather map that is painted as strongly as a mask says.
+
+    Parameters
+    ----------
+    map : array-like, shape (H, W, 3)
+        As for `paint`.
+    mask : array-like, shape (H, W)
+        How strong the brush is at each texel, 0 to 1.
+    channel, amount, mode
+        As for `paint`.
+
+    Returns
+    -------
+    map : array of float32, shape (H, W, 3)
+    """
+    texels = _map(map)
+    index = get_args(Channel).index(_one_of("channel", channel, Channel))
+    low, high = {"add": (-1.0, 1.0), "set": (0.0, 1.0), "multiply": (0.0, 1e6)}[
+        _one_of("mode", mode, Mode)
+    ]
+    strength = _number("amount", amount, low, high)
+    share = _numbers("mask", mask, f"an array of shape {texels.shape[:2]}, values from 0 to 1")
+    if share.shape != texels.shape[:2]:
+        raise ParameterError(
+            f"mask of shape {share.shape} is not allowed: it must be as the map, {texels.shape[:2]}"
+        )
+    _in_range("mask", share)
+    old = texels[..., index].astype(np.float64)
+    if mode == "add":
+        new = old + strength * share
+    elif mode == "set":
+        new = old + (strength - old) * share
+    else:
+        new = old * (1 + (strength - 1) * share)
+    texels[..., index] = new.clip(0, 1)
+    return texels
+
+
+def _stroke(
+    size: tuple[int, ...],
+    path: npt.NDArray[np.float64],
+    radius: float,
+    extent: float,
+    hardness: float,
+    edge: str,
+) -> npt.NDArray[np.float64]:
+    """How strong the brush is at the middle of each texel, shape (H, W)."""
+    height, width = size
+    x = ((np.arange(width) + 0.5) / width - 0.5) * extent
+    y = (0.5 - (np.arange(height) + 0.5) / height) * extent
+    squares = np.full((height, width), np.inf)
+    corners = path if len(path) > 1 else np.concatenate([path, path])
+    for start, end in _pieces(corners, extent):
+        low, high = np.minimum(start, end) - radius, np.maximum(start, end) + radius
+        # A texel is seen in the sky once, or once in each tile; in every other one it is mirrored.
+        for px in _images(x, low[0], high[0], extent, edge):
+            columns = np.flatnonzero((px >= low[0]) & (px <= high[0]))
+            for py in _images(y, low[1], high[1], extent, edge):
+                rows = np.flatnonzero((py >= low[1]) & (py <= high[1]))
+                if columns.size and rows.size:
+                    window = np.ix_(rows, columns)
+                    found = _squared_distance(px[columns], py[rows][:, None], start, end)
+                    squares[window] = np.minimum(squares[window], found)
+    beyond = (np.sqrt(squares) / radius - hardness) / max(1 - hardness, 1e-9)
+    fall = 1 - beyond.clip(0, 1)
+    smooth: npt.NDArray[np.float64] = fall * fall * (3 - 2 * fall)
+    return smooth
+
+
+def _images(
+    places: npt.NDArray[np.float64], low: float, high: float, extent: float, edge: str
+) -> list[npt.NDArray[np.float64]]:
+    """Where the texels of an axis are in each tile that the brush reaches."""
+    if edge == "clamp":
+        return [places]
+    first, last = (int(np.floor(v / extent + 0.5)) for v in (low, high))
+    mirrored = [-1 if edge == "mirror" and k % 2 else 1 for k in range(first, last + 1)]
+    return [k * extent + s * places for k, s in zip(range(first, last + 1), mirrored, strict=True)]
+
+
+def _pieces(
+    corners: npt.NDArray[np.float64], longest: float
+) -> Iterator[tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]]:
+    """Straight parts of a path, none so long that most of the tiles around it are out of reach."""
+    for start, end in itertools.pairwise(corners):
+        count = max(int(np.ceil(np.hypot(*(end - start)) / longest)), 1)
+        yield from itertools.pairwise(np.linspace(start, end, count + 1))
+
+
+def _squared_distance(
+    x: npt.NDArray[np.float64],
+    y: npt.NDArray[np.float64],
+    start: npt.NDArray[np.float64],
+    end: npt.NDArray[np.float64],
+) -> Any:
+    """From points to a straight line between two."""
+    (dx, dy), (rx, ry) = end - start, (x - start[0], y - start[1])
+    length = dx * dx + dy * dy
+    along = ((rx * dx + ry * dy) / length).clip(0, 1) if length > 0 else 0.0
+    return (rx - along * dx) ** 2 + (ry - along * dy) ** 2
+
+
+def _map(value: npt.ArrayLike) -> Map:
+    """A copy, checked."""
+    allowed = "an array of numbers of shape (H, W, 3), values from 0 to 1"
+    texels = _numbers("map", value, allowed)
+    if texels.ndim != 3 or texels.shape[2] != 3 or 0 in texels.shape:
+        raise ParameterError(f"map of shape {texels.shape} is not allowed: it must be {allowed}")
+    _in_range("map", texels)
+    return texels.astype(np.float32)
+
+
+def _path(value: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    allowed = "a point (x, y) or points of shape (N, 2), world metres within 1e7 of the origin"
+    points = np.atleast_2d(_numbers("at", value, allowed))
+    if points.ndim != 2 or points.shape[1] != 2 or len(points) == 0:
+        raise ParameterError(f"at of shape {points.shape} is not allowed: it must be {allowed}")
+    bad = points[~(np.abs(points) <= 1e7)]
+    if bad.size:
+        raise ParameterError(f"at with {bad[0]} is not allowed: it must be {allowed}")
+    return points
+
+
+def _numbers(name: str, value: Any, allowed: str) -> npt.NDArray[np.float64]:
+    try:
+        array = np.asarray(value)
+    except ValueError as error:
+        raise ParameterError(f"{name} is not allowed: it must be {allowed} ({error})") from None
+    if array.dtype.kind not in "fiu":
+        raise ParameterError(f"{name} of {array.dtype} is not allowed: it must be {allowed}")
+    return array.astype(np.float64)
+
+
+def _in_range(name: str, values: npt.NDArray[np.float64]) -> None:
+    bad = values[~((values >= 0) & (values <= 1))]
+    if bad.size:
+        raise ParameterError(f"{name} with {bad[0]} is not allowed: values must be from 0 to 1")
+
+
+def _number(name: str, value: Any, low: float, high: float, unit: str = "") -> float:
+    number = _nubis.number(name, value)
+    if not low <= number <= high:
+        allowed = f"a number from {low:g} to {high:g} {unit}".rstrip()
+        raise ParameterError(f"{name} = {value!r} is not allowed: it must be {allowed}")
+    return number
+
+
+def _one_of(name: str, value: Any, words: Any) -> str:
+    known = get_args(words)
+    if not isinstance(value, str) or value not in known:
+        raise ParameterError(f"{name} = {value!r} is not allowed: it must be one of {known}")
+    return value

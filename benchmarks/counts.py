@@ -24,7 +24,15 @@ import nubis
 from benchmarks.reference import ROOT, Size
 
 #: What a march reads for its clouds, by the names of shaders/wgsl/bindings.wgsl.
-TEXTURES = "weather_map", "shape_noise", "curl_noise", "detail_noise", "sun_volume"
+TEXTURES = (
+    "profile_table",
+    "broad_map",
+    "weather_map",
+    "shape_noise",
+    "curl_noise",
+    "detail_noise",
+    "sun_volume",
+)
 
 Counts = npt.NDArray[np.uint32]
 

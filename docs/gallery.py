@@ -4,7 +4,7 @@
     python -m docs.gallery cover storm --size 1280x720 --out /tmp
 
 A block of Python is followed by a link to its picture. It sees `nubis`, and says which `camera` and
-`params` are rendered, and, if it likes, at which `time` and with which `exposure`.
+`params` are rendered, and, if it likes, at which `time`, with which `exposure` and `quality`.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import nubis
 
@@ -30,6 +30,28 @@ _LINK = re.compile(rf"\s*!\[[^\]]+\]\({FOLDER}/(?P<name>\w+)\.png\)")
 
 class PageError(nubis.NubisError, ValueError):
     """The page is not as it should be: says in which line."""
+
+
+class Shot(NamedTuple):
+    """What the lines above a picture say.
+
+    Attributes
+    ----------
+    camera : nubis.Camera
+    params : nubis.Params
+    time : float
+        Seconds.
+    exposure : float
+        Stops.
+    quality : str or None
+        The numerical method, where the picture needs one of its own.
+    """
+
+    camera: nubis.Camera
+    params: nubis.Params
+    time: float = 0.0
+    exposure: float = 0.0
+    quality: str | None = None
 
 
 @dataclass(frozen=True)
@@ -55,16 +77,15 @@ class Picture:
         """Its file, as the page links it."""
         return PAGE.parent / FOLDER / f"{self.name}.png"
 
-    def shot(self) -> tuple[nubis.Camera, nubis.Params, float, float]:
-        """Run the lines: camera, parameters, time in seconds and exposure in stops."""
+    def shot(self) -> Shot:
+        """Run the lines."""
         names: dict[str, Any] = {"nubis": nubis}
         # Empty lines in front, so that a mistake is found where it is.
         exec(compile("\n" * (self.line - 1) + self.code, str(PAGE), "exec"), names)
         for name, kind in (("camera", nubis.Camera), ("params", nubis.Params)):
             if not isinstance(names.get(name), kind):
                 raise PageError(f"{PAGE.name}:{self.line}: the lines must make a `{name}`")
-        time, exposure = names.get("time", 0.0), names.get("exposure", 0.0)
-        return names["camera"], names["params"], time, exposure
+        return Shot(**{name: names[name] for name in Shot._fields if name in names})
 
 
 def pictures(text: str) -> list[Picture]:
@@ -95,7 +116,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("names", nargs="*", metavar="NAME", help="pictures (default: all)")
     parser.add_argument("--size", type=_size, default=(640, 360), metavar="WxH", help="640x360")
-    parser.add_argument("--quality", default="balanced", help="numerical method (balanced)")
+    parser.add_argument(
+        "--quality",
+        default="balanced",
+        help="where a picture names none (balanced)",
+    )
     parser.add_argument("--out", type=Path, metavar="DIR", help=f"folder (docs/{FOLDER})")
     args = parser.parse_args(arguments)
     try:
@@ -106,14 +131,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 raise PageError(f"there is no picture {name!r}, only {', '.join(known)}")
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", "no hardware Vulkan adapter")
-            renderer = nubis.Renderer(*args.size, quality=args.quality)
+            usual = nubis.Renderer(*args.size, quality=args.quality)
         for picture in page:
             if args.names and picture.name not in args.names:
                 continue
-            camera, params, time, exposure = picture.shot()
+            shot = picture.shot()
+            own = nubis.Renderer(*args.size, quality=shot.quality) if shot.quality else usual
             path = args.out / f"{picture.name}.png" if args.out else picture.path
             path.parent.mkdir(parents=True, exist_ok=True)
-            nubis.save(path, renderer.render(camera, params, time=time), exposure=exposure)
+            frame = own.render(shot.camera, shot.params, time=shot.time)
+            nubis.save(path, frame, exposure=shot.exposure)
             print(path, flush=True)
     except (nubis.NubisError, OSError) as error:
         print("gallery:", error, file=sys.stderr)

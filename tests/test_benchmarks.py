@@ -261,6 +261,8 @@ def test_soak_sees_faults():
 
 
 FAIR = nubis.scenes["fair_weather"]
+#: With one weather map, as the sources have.
+PLAIN = FAIR[0], FAIR[1].with_(**{"weather.broad_variety": 0.0})
 
 
 @pytest.fixture(scope="module")
@@ -271,7 +273,7 @@ def panels():
 
 def test_reads_are_counted():
     """Each texture by itself, all together, and the light samples by what they must read."""
-    camera, params = FAIR
+    camera, params = PLAIN
     night = params.with_(**{"sun.irradiance": (0.0, 0.0, 0.0)})
     quality = nubis.quality("thesis2018")
     kinds = "evaluations", "reads", *counts.TEXTURES
@@ -284,7 +286,10 @@ def test_reads_are_counted():
     assert (day["reads"] == sum(day[name] for name in counts.TEXTURES)).all()
     assert (day["weather_map"] == day["evaluations"]).all()
     assert (day["shape_noise"] == day["evaluations"]).all()
-    assert (day["curl_noise"] == day["detail_noise"]).all() and not day["sun_volume"].any()
+    assert (day["curl_noise"] == day["detail_noise"]).all()
+    assert not any(day[name].any() for name in ("sun_volume", "broad_map", "profile_table"))
+    broad = [counts.Job(*FAIR, quality, kind) for kind in ("evaluations", "broad_map")]
+    assert np.array_equal(*counts.count(broad, (48, 27)))
     # Five full light samples and a far one of half the reads at each lit step.
     lit = (day["evaluations"] - dark["evaluations"]) / 6
     assert lit.any() and (day["reads"] - dark["reads"] == 22 * lit).all()

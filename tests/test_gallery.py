@@ -14,7 +14,7 @@ PICTURES = gallery.pictures(TEXT)
 
 @pytest.mark.parametrize("picture", PICTURES, ids=lambda picture: picture.name)
 def test_lines_make_a_picture(renderer, picture):
-    camera, params, time, exposure = picture.shot()
+    camera, params, time, exposure, _ = picture.shot()
     frame = renderer(32, 18).render(camera, params, time=time)
     assert np.isfinite(frame).all() and frame[..., :3].max() > 0
     assert nubis.to_srgb8(frame, exposure=exposure).std() > 5  # something is to be seen
@@ -43,10 +43,10 @@ LINK = "\n![Above](images/clouds/above.png)\n"
 def test_the_page_is_read():
     (one,) = gallery.pictures("# Page\n\n" + LINES + LINK)
     assert (one.name, one.line) == ("above", 4)
-    assert one.shot() == (*nubis.scenes["above"], 0.0, 0.0)
+    assert one.shot() == (*nubis.scenes["above"], 0.0, 0.0, None)
     timed = LINES.replace("\n```\n", "\ntime, exposure = 5.0, 1.5\n```\n")
     (one,) = gallery.pictures(timed + LINK)
-    assert one.shot()[2:] == (5.0, 1.5)
+    assert one.shot()[2:] == (5.0, 1.5, None)
 
 
 @pytest.mark.parametrize(

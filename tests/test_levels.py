@@ -21,7 +21,7 @@ def changed(before, after):
     names = set()
     for group in dataclasses.fields(Params):
         old, new = getattr(before, group.name), getattr(after, group.name)
-        if group.name == "volume" or old is None or new is None:
+        if not (dataclasses.is_dataclass(old) and dataclasses.is_dataclass(new)):
             names |= {group.name} if old != new else set()
             continue
         for field in dataclasses.fields(old):

@@ -134,7 +134,7 @@ def test_big_steps_find_the_same_clouds(renderer):
     """
     camera, params = nubis.scenes["fair_weather"]
     small, big = (
-        renderer(48, 27, twin.fine(128, big_step=b, empty_samples=6)).render_layers(camera, params)
+        renderer(48, 27, twin.fine(192, big_step=b, empty_samples=6)).render_layers(camera, params)
         for b in (1, 4)
     )
     assert (small["transmittance"] < 0.9).any()

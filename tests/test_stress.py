@@ -145,7 +145,8 @@ def test_density_and_sunlight_anywhere(data):
     make = renderer((1, 1), DRAFT)
     extinction = make.density(points, params, time=time)
     assert np.isfinite(extinction).all() and extinction.min() >= 0
-    most = params.clouds.extinction
+    clouds, deck = params.clouds, params.upper_clouds
+    most = max(clouds.extinction, clouds.rain_extinction, deck.extinction)
     if getattr(params, "volume", None) is not None:
         most = max(most, float(params.volume.extinction.max()))
     assert extinction.max() <= np.float32(most) * (1 + 1e-6)

@@ -41,10 +41,14 @@ def _make() -> dict[str, Params]:
             "high_clouds.coverage": 0.3,
         },
         "storm": {
-            "clouds.coverage": 0.6,
+            "clouds.coverage": 0.55,
             "clouds.precipitation": 0.9,
             "clouds.base": 900.0,
-            "clouds.top": 5500.0,
+            "clouds.rain_extinction": 2e-4,
+        },
+        "two_decks": {
+            "clouds.coverage": 0.42,
+            "upper_clouds.coverage": 0.55,
         },
         "cirrus": {"clouds.coverage": 0.25, "high_clouds.coverage": 0.6},
     }

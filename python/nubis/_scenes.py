@@ -57,6 +57,7 @@ def _make() -> dict[str, tuple[Camera, Params]]:
             _look((0, 0, 200), 300, 25),
             presets["cirrus"],
         ),
+        "two_decks": (_look((0, 0, 200), 10, 20), presets["two_decks"]),
         "mackerel": (
             _look((0, 0, 200), 330, 24),
             fair.with_(

@@ -24,6 +24,22 @@ fn no_reads(start: vec3f, count: u32) -> f32 {
     return dot(sum, vec4f(1.0));
 }
 
+fn reads_of_profile_table(start: vec3f, count: u32) -> f32 {
+    var sum = vec4f(0.0);
+    for (var i = 0u; i < count; i++) {
+        sum += textureSampleLevel(profile_table, clamp_sampler, read_at(start, i, 64.0).xy, 0.0);
+    }
+    return dot(sum, vec4f(1.0));
+}
+
+fn reads_of_broad_map(start: vec3f, count: u32) -> f32 {
+    var sum = vec4f(0.0);
+    for (var i = 0u; i < count; i++) {
+        sum += textureSampleLevel(broad_map, repeat_sampler, read_at(start, i, 128.0).xy, 0.0);
+    }
+    return dot(sum, vec4f(1.0));
+}
+
 fn reads_of_weather_map(start: vec3f, count: u32) -> f32 {
     var sum = vec4f(0.0);
     for (var i = 0u; i < count; i++) {

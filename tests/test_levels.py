@@ -40,6 +40,7 @@ def test_presets():
         # What the time of day, the wind and the chance of a seed are, is nothing of a preset.
         assert {name.split(".")[0] for name in changed(Params(), params)} <= {
             "clouds",
+            "upper_clouds",
             "high_clouds",
         }
 

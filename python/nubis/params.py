@@ -13,10 +13,11 @@ import numpy.typing as npt
 
 from nubis._block import Block, Root
 from nubis._nubis import DensityGrid
+from nubis._sun import SunBlock
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Sun(Block):
+class Sun(SunBlock):
     """The sun.
 
     Attributes

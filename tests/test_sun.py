@@ -11,7 +11,7 @@ import pytest
 import nubis
 
 # Reda and Andreas 2004 (NREL/TP-560-34302), appendix A.5: Golden, Colorado, on 17 October 2003 at
-# 12:30:30, 7 hours behind UTC. Their zenith distance of 50.11162 has 0.01633 of refraction in it
+# 12:30:30, 7 h behind UTC. Their zenith distance of 50.11162 has 0.01633 of refraction in it
 # (820 mbar, 11 degrees), and their observer stands at 1830 m. Azimuth 194.34024.
 GOLDEN = (
     39.742476,
@@ -27,8 +27,9 @@ def test_published_example():
 
 
 # Meeus, "Astronomical Algorithms", example 25.b: on 13 October 1992 at 0 h of dynamical time
-# (59 s before that of UTC) the sun's declination is -7d 47' 1.74". At the pole, that is its elevation,
-# less a parallax of 0.0024. Solstices and equinoxes are the Astronomical Almanac's, to a minute.
+# (59 s before that of UTC) the sun's declination is -7d 47' 1.74". At the pole, that is its
+# elevation, less a parallax of 0.0024. Solstices and equinoxes are the Astronomical Almanac's,
+# to a minute.
 ALMANAC = [
     (90.0, 0.0, datetime(1992, 10, 12, 23, 59, 1, tzinfo=UTC), -7.783817 - 0.0024, 3e-4),
     (90.0, 0.0, datetime(2024, 6, 20, 20, 51, tzinfo=UTC), 23.4386 - 0.0024, 4e-3),
@@ -78,7 +79,7 @@ def test_zones_and_fields():
     ],
 )
 def test_refused(arguments, name):
-    with pytest.raises(nubis.ParameterError, match=f"^{name} = "):
+    with pytest.raises(nubis.ParameterError, match=rf"^{name} = "):
         nubis.Sun.at(*arguments)
 
 

@@ -74,4 +74,5 @@ class SunBlock(Block):
         azimuth, zenith = observed_sunposition(
             universal, *place, 0.0, pressure=0.0, delta_t=_DELTA_T, jit=False
         )
-        return cls(elevation=90 - float(zenith), azimuth=float(azimuth), **fields)
+        fields = {"elevation": 90 - float(zenith), "azimuth": float(azimuth), **fields}
+        return cls(**fields)

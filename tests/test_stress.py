@@ -61,7 +61,12 @@ PUBLISHED = ("nubis2015", "thesis2018", "vsu2022")
 
 
 def phase_peak(light):
-    """The largest value of Henyey and Greenstein's function for either lobe."""
+    """The largest value of Henyey and Greenstein's function for either lobe; that of droplets is
+    less than of the fit's forward lobe.
+    """
+    if light.phase != "henyey_greenstein":
+        g = twin.droplet_lobes(light.droplet_diameter)[0]
+        return (1 + g) / (4 * np.pi * (1 - g) ** 2)
     return max((1 + abs(g)) / (4 * np.pi * (1 - abs(g)) ** 2) for g in (light.g, light.g_back))
 
 

@@ -143,6 +143,29 @@ def single_scattering(renderer, params, eye, directions, n, n_sun, time=0.0):
     return scattered[:, None] * np.array(params.sun.irradiance)
 
 
+def droplet_lobes(diameter):
+    """Jendersie and d'Eon 2023: g of the Henyey-Greenstein lobe; g, alpha, share of Draine's."""
+    return (
+        np.exp(-0.0990567 / (diameter - 1.67154)),
+        np.exp(-2.20679 / (diameter + 3.91029) - 0.428934),
+        np.exp(3.62489 - 8.29288 / (diameter + 5.52825)),
+        np.exp(-0.599085 / (diameter - 0.641583) - 0.665888),
+    )
+
+
+def draine(mu, g, alpha):
+    """Draine 2003, equation 1 of Jendersie and d'Eon."""
+    shape = (1 - g**2) * (1 + alpha * mu**2) / (1 + g**2 - 2 * g * mu) ** 1.5
+    return shape / (4 * np.pi * (1 + alpha * (1 + 2 * g**2) / 3))
+
+
+def droplet(mu, diameter, peak=1.0):
+    """The blend, with g and alpha of both lobes times `peak`."""
+    g, g_draine, alpha, share = droplet_lobes(diameter)
+    body = draine(mu, peak * g_draine, peak * alpha)
+    return (1 - share) * draine(mu, peak * g, 0.0) + share * body
+
+
 def henyey_greenstein(mu, g):
     """As printed in 1941, with float64 to pay for its cancellations."""
     mu = np.asarray(mu, dtype=np.longdouble)

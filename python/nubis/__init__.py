@@ -18,13 +18,15 @@ from nubis._errors import (
     NubisError,
     ParameterError,
 )
-from nubis._image import load_map, save, to_srgb8
+from nubis._image import auto_exposure, load_map, save, to_srgb8
+from nubis._keyframes import Keyframes
 from nubis._lerp import lerp
 from nubis._levels import presets, sky
 from nubis._nubis import Camera, DensityGrid
 from nubis._paint import paint, paint_mask
 from nubis._renderer import Adapter, Renderer, adapters, quality
 from nubis._scenes import scenes
+from nubis._units import LUMINOUS_EFFICACY, SOLAR_IRRADIANCE, luminance
 from nubis._weather import WeatherBlend, WeatherChange
 from nubis.params import (
     Atmosphere,
@@ -43,6 +45,8 @@ from nubis.params import (
 __version__ = "0.1.0"
 
 __all__ = [
+    "LUMINOUS_EFFICACY",
+    "SOLAR_IRRADIANCE",
     "Adapter",
     "AdapterError",
     "Atmosphere",
@@ -53,6 +57,7 @@ __all__ = [
     "FileError",
     "ForkError",
     "HighClouds",
+    "Keyframes",
     "Light",
     "NubisError",
     "ParameterError",
@@ -67,8 +72,10 @@ __all__ = [
     "WeatherChange",
     "Wind",
     "adapters",
+    "auto_exposure",
     "lerp",
     "load_map",
+    "luminance",
     "paint",
     "paint_mask",
     "presets",

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from time import perf_counter
+from typing import Literal
 
 import numpy as np
 
@@ -79,7 +80,11 @@ def _parser() -> argparse.ArgumentParser:
         "--time", type=float, default=0.0, metavar="S", help="seconds of wind (default: 0)"
     )
     render.add_argument(
-        "--exposure", type=float, default=0.0, metavar="E", help="stops, for png (default: 0)"
+        "--exposure",
+        type=_exposure,
+        default=0.0,
+        metavar="E",
+        help="stops, or auto, for png (default: 0)",
     )
     clouds = render.add_mutually_exclusive_group()
     clouds.add_argument(
@@ -119,6 +124,15 @@ def _parser() -> argparse.ArgumentParser:
         command = commands.add_parser(name, help=about, description=about.capitalize() + ".")
         command.set_defaults(run=run)
     return parser
+
+
+def _exposure(text: str) -> float | Literal["auto"]:
+    if text == "auto":
+        return "auto"
+    try:
+        return float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is neither a number nor auto") from None
 
 
 def _size(text: str) -> tuple[int, int]:

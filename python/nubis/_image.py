@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from pathlib import Path
 from typing import Any, Literal
@@ -11,6 +12,7 @@ import numpy.typing as npt
 
 from nubis import _nubis
 from nubis._errors import FileError, ParameterError
+from nubis._units import LUMINANCE
 
 
 def to_srgb8(
@@ -35,6 +37,57 @@ def to_srgb8(
     return _nubis.to_srgb8(_pixels(frame), stops, tonemap)
 
 
+def auto_exposure(
+    frame: npt.ArrayLike,
+    *,
+    key: float = 0.18,
+    low: float = 5.0,
+    high: float = 95.0,
+) -> float:
+    """Return the exposure, in stops, at which a picture is neither too dark nor too bright.
+
+    It brings the mean of the logarithm of the luminance to that of `key` (Reinhard et al. 2002).
+    Pixels without light count nothing, and neither do the darkest and the brightest of the others:
+    the sun's disc and its glare change nothing.
+
+    Parameters
+    ----------
+    frame : array-like, shape (H, W, 3) or (H, W, 4)
+        Scene-linear radiance with Rec. 709 primaries.
+    key : float
+        What the mean becomes: 0.18 is middle grey, less a night.
+    low, high : float
+        Percent of the pixels with light below and from which on they are left out.
+
+    Returns
+    -------
+    float
+        Stops, for `to_srgb8` and `save`; 0 where there is no light.
+
+    Raises
+    ------
+    ParameterError
+        For an array that is no picture, and shares that leave nothing.
+    """
+    wanted = _nubis.number("key", key)
+    if not 0 < wanted < math.inf:
+        raise ParameterError(f"key = {key!r} is not allowed: it must be a number above 0")
+    first, last = _nubis.number("low", low), _nubis.number("high", high)
+    if not 0 <= first < last <= 100:
+        raise ParameterError(
+            f"low = {low!r} is not allowed: it must be from 0 to less than high = {high!r}, which "
+            "must be at most 100"
+        )
+    light = _pixels(frame)[..., :3].astype(np.float64) @ LUMINANCE
+    light = np.sort(np.log2(light[np.isfinite(light) & (light > 0)]))
+    if not light.size:
+        return 0.0
+    start = math.floor(first / 100 * light.size)
+    # One at least is left.
+    end = max(math.ceil(last / 100 * light.size), start + 1)
+    return float(math.log2(wanted) - light[start:end].mean())
+
+
 def heat(counts: npt.NDArray[np.uint32], white: int = 1000) -> npt.NDArray[np.uint8]:
     """Return 8-bit pixels: black where a count is 0, then red, yellow, white from `white` on."""
     ramp = 3 * counts[..., None] / white - np.arange(3)
@@ -46,13 +99,14 @@ def save(
     path: str | os.PathLike[str],
     frame: npt.ArrayLike,
     *,
-    exposure: float = 0.0,
+    exposure: float | Literal["auto"] = 0.0,
     tonemap: Literal["agx", "aces", "none"] = "agx",
 ) -> None:
     """Write a picture; the ending says how.
 
     ``.png`` is tone-mapped with `to_srgb8` (alpha is kept where any pixel is not opaque);
-    ``.exr`` (float32), ``.hdr`` (Radiance, no alpha) and ``.npy`` stay linear.
+    ``.exr`` (float32), ``.hdr`` (Radiance, no alpha) and ``.npy`` stay linear. An exposure of
+    ``"auto"`` is that of `auto_exposure`.
 
     Raises
     ------
@@ -64,8 +118,13 @@ def save(
     target = Path(path)
     kind = target.suffix.lower()
     pixels = _pixels(frame)
+    if isinstance(exposure, str) and exposure != "auto":
+        raise ParameterError(
+            f"exposure = {exposure!r} is not allowed: it must be a number of stops or 'auto'"
+        )
     if kind == ".png":
-        image = to_srgb8(pixels, exposure, tonemap)
+        stops = auto_exposure(pixels) if isinstance(exposure, str) else exposure
+        image = to_srgb8(pixels, stops, tonemap)
         if image.shape[2] == 4 and np.all(image[..., 3] == 255):
             image = np.ascontiguousarray(image[..., :3])
         _nubis.write_png(target, _straight(image))

@@ -13,10 +13,11 @@ import numpy.typing as npt
 
 from nubis._block import Block, Root
 from nubis._nubis import DensityGrid
+from nubis._sun import SunBlock
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Sun(Block):
+class Sun(SunBlock):
     """The sun.
 
     Attributes
@@ -356,6 +357,14 @@ class Light(Block):
     model : {single, nubis2015, thesis2018, vsu2022, octaves, path}
         The physics of the light in the clouds. Allowed: one of "single", "nubis2015", "thesis2018",
         "vsu2022", "octaves", "path".
+    phase : {henyey_greenstein, droplet, mie}
+        The phase function: `henyey_greenstein` of `g` (in thesis2018 and vsu2022 of `g_back`, too)
+        as published; `droplet` a fit of real droplets, whose clouds have a silver lining (Jendersie
+        and d'Eon 2023); `mie` the droplets themselves, with fogbow and glory. Allowed: one of
+        "henyey_greenstein", "droplet", "mie".
+    droplet_diameter : float
+        Diameter of the droplets (`droplet`, `mie`): fog 5 to 20, cumulus 10 to 30, drizzle 50.
+        Allowed: a number from 5 to 50 µm.
     g : float
         Mean cosine of the forward lobe of the phase function. Allowed: a number from -0.9999 to
         0.9999.
@@ -377,7 +386,8 @@ class Light(Block):
         Share of the extinction toward the sun that each octave keeps of the one before. Allowed: a
         number from 0 to 1.
     octave_phase : float
-        Share of `g` that each octave keeps of the one before. Allowed: a number from 0 to 1.
+        Share of `g` that each octave keeps of the one before (of each lobe's, where the phase
+        function is `droplet` or `mie`). Allowed: a number from 0 to 1.
     sun_gain : float
         Gain of the sunlight in the published models, which do not conserve energy. Allowed: a
         number from 0 to 1000.
@@ -404,6 +414,8 @@ class Light(Block):
     """
 
     model: Literal["single", "nubis2015", "thesis2018", "vsu2022", "octaves", "path"] = "thesis2018"
+    phase: Literal["henyey_greenstein", "droplet", "mie"] = "henyey_greenstein"
+    droplet_diameter: float = 20.0
     g: float = 0.6
     g_back: float = -0.25
     lobe_mix: float = 0.5

@@ -4,6 +4,7 @@
 
 // What a pipeline is made for; the rest is compiled out (crates/clouds_core/src/kernel.rs).
 override MODEL: u32 = 0u; // light.model
+override PHASE: u32 = 0u; // light.phase
 override VOLUME: bool = false; // the clouds are the user's grid, not procedural
 override KEEP_CLEAR: bool = false; // there is a spot without clouds
 override CAMERA: u32 = 0u; // the projection, see camera.wgsl
@@ -32,6 +33,7 @@ override LIGHT_CHEAP: bool = true; // there are light samples that do not
 @group(0) @binding(7) var weather_map: texture_2d<f32>; // coverage, type, precipitation (passes/weather)
 @group(0) @binding(48) var broad_map: texture_2d<f32>; // shifts of those, and what bends the smaller map (passes/broad_weather)
 @group(0) @binding(49) var profile_table: texture_2d<f32>; // density by type and height (passes/profile)
+@group(0) @binding(50) var phase_table: texture_2d<f32>; // phase function and its integral by angle (passes/phase)
 @group(0) @binding(8) var high_map: texture_2d<f32>; // density of the high clouds (passes/high_clouds)
 @group(0) @binding(9) var sky_map: texture_2d<f32>; // the sky by direction, see SKY_MAP_SCALE (passes/sky)
 @group(0) @binding(10) var<storage, read_write> sky_light: array<vec4f, 4>; // what the sky gives to clouds (passes/sky)

@@ -1,6 +1,7 @@
 // How sunlight and skylight become the brightness of a cloud: the published models, each as its source gives it.
 #import math
 #import phase
+#import droplets
 #import shell
 #import density
 #import sun_volume
@@ -104,8 +105,11 @@ fn light_sample(samples: LightSamples, p: vec3f, i: u32, width: f32) -> LightSam
     return LightSample(at, altitude_at(at), length, max(width, 0.5 * length));
 }
 
-// The phase function of the light model: Henyey-Greenstein, or two lobes of it.
+// The phase function of the light model: Henyey-Greenstein, or two lobes of it, or that of droplets.
 fn model_phase(one_minus_mu: f32) -> f32 {
+    if PHASE != PHASE_HENYEY_GREENSTEIN {
+        return droplet_phase(one_minus_mu);
+    }
     let forward = henyey_greenstein(one_minus_mu, params.light.g);
     let backward = henyey_greenstein(one_minus_mu, params.light.g_back);
     switch MODEL {
@@ -147,12 +151,20 @@ fn octaves(depth: f32, one_minus_mu: f32) -> f32 {
     var sum = 0.0;
     var share = 1.0;
     var d = depth;
-    var g = params.light.g;
+    var peak = 1.0;
     for (var i = 0u; i < params.light.octaves; i++) {
-        sum += share * henyey_greenstein(one_minus_mu, g) * exp(-d);
+        var phase = 0.0;
+        if PHASE == PHASE_HENYEY_GREENSTEIN {
+            phase = henyey_greenstein(one_minus_mu, peak * params.light.g);
+        } else if PHASE == PHASE_MIE && i == 0u {
+            phase = droplet_phase(one_minus_mu);
+        } else {
+            phase = droplet_fit(one_minus_mu, peak);
+        }
+        sum += share * phase * exp(-d);
         share *= params.light.octave_scattering;
         d *= params.light.octave_extinction;
-        g *= params.light.octave_phase;
+        peak *= params.light.octave_phase;
     }
     return sum;
 }

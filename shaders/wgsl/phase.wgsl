@@ -18,16 +18,31 @@ fn one_minus_cos(a: vec3f, b: vec3f) -> f32 {
     return min(0.5 * dot(d, d), 2.0);
 }
 
+// Draine 2003: Henyey and Greenstein's function times 1 + alpha mu^2, normalised.
+fn draine(one_minus_mu: f32, g: f32, alpha: f32) -> f32 {
+    let mu = 1.0 - one_minus_mu;
+    return henyey_greenstein(one_minus_mu, g) * (1.0 + alpha * mu * mu) / (1.0 + alpha * (1.0 + 2.0 * g * g) / 3.0);
+}
+
 // A direction scattered from `direction` by Henyey and Greenstein's function, for two random numbers. The cosine comes as
 // its difference to 1, without the cancellations of the printed form (hazard 5).
 fn scattered(direction: vec3f, g: f32, u: vec2f) -> vec3f {
-    var one_minus_mu = 2.0 * u.x;
-    if abs(g) > 1e-4 {
-        let s = (1.0 - g) * (1.0 + g) / (1.0 - g + 2.0 * g * u.x);
-        one_minus_mu = clamp((s + 1.0 - g) * (1.0 - g) * (1.0 - u.x) / (1.0 - g + 2.0 * g * u.x), 0.0, 2.0);
+    return turned(direction, scattered_cosine(g, u.x), u.y);
+}
+
+// Of that, 1 minus the cosine.
+fn scattered_cosine(g: f32, u: f32) -> f32 {
+    if abs(g) <= 1e-4 {
+        return 2.0 * u;
     }
+    let s = (1.0 - g) * (1.0 + g) / (1.0 - g + 2.0 * g * u);
+    return clamp((s + 1.0 - g) * (1.0 - g) * (1.0 - u) / (1.0 - g + 2.0 * g * u), 0.0, 2.0);
+}
+
+// The direction at an angle to `direction` whose cosine is less than 1 by `one_minus_mu`, at a random place around it.
+fn turned(direction: vec3f, one_minus_mu: f32, u: f32) -> vec3f {
     let sine = sqrt(one_minus_mu * (2.0 - one_minus_mu));
-    let angle = 2.0 * PI * u.y - PI;
+    let angle = 2.0 * PI * u - PI;
     let across = perpendicular(direction);
     let side = cos(angle) * across + sin(angle) * cross(direction, across);
     return normalize((1.0 - one_minus_mu) * direction + sine * side);

@@ -133,6 +133,10 @@ params! {
         /// The shortest side of a voxel, m.
         voxel: f32 = 0.0;
 
+        /// Of the fit of cloud droplets (droplets.wgsl): g of its Henyey-Greenstein lobe, g and alpha of Draine's, and the
+        /// share of that.
+        droplet: [f32; 4] = [0.0; 4];
+
         /// Where the eye is in the sun volume, after the wind, m from its middle (sun_volume.wgsl).
         sun_volume_eye: [f32; 2] = [0.0; 2];
         /// Cells of that between the lowest and the highest clouds.
@@ -204,6 +208,16 @@ const HALF_SUN: f64 = 0.006;
 /// Altitude where the air ends, m (Hillaire 2020).
 const AIR_TOP: f64 = 100_000.0;
 
+/// The parameters of the phase function of droplets of 5 to 50 µm diameter (Jendersie and d'Eon 2023, equations 4 to 7).
+fn droplet(diameter: f64) -> [f64; 4] {
+    [
+        (-0.099_056_7 / (diameter - 1.671_54)).exp(),
+        (-2.206_79 / (diameter + 3.910_29) - 0.428_934).exp(),
+        (3.624_89 - 8.292_88 / (diameter + 5.528_25)).exp(),
+        (-0.599_085 / (diameter - 0.641_583) - 0.665_888).exp(),
+    ]
+}
+
 /// The unit vector toward the sun.
 pub fn sun_direction(params: &Params) -> DVec3 {
     let (elevation, azimuth) = (f64::from(params.sun.elevation), f64::from(params.sun.azimuth));
@@ -257,6 +271,7 @@ impl Frame {
         frame.high_clouds = u32::from(params.high_clouds.coverage > 0.0);
         frame.sun_direction = sun_direction(params).as_vec3().to_array();
         frame.set_high_sun(params);
+        frame.droplet = droplet(f64::from(params.light.droplet_diameter)).map(|v| v as f32);
         frame
     }
 

@@ -69,7 +69,10 @@ fn wrapped(text: &str, indent: &str) -> String {
 }
 
 fn dataclass(out: &mut String, block: &dyn Block) {
-    let _ = writeln!(out, "\n\n@dataclass(frozen=True, kw_only=True, eq=False)\nclass {}(Block):", block.type_name());
+    // Blocks that can do more than hold parameters have a base of their own.
+    let base = if block.type_name() == "Sun" { "SunBlock" } else { "Block" };
+    let decorator = "@dataclass(frozen=True, kw_only=True, eq=False)";
+    let _ = writeln!(out, "\n\n{decorator}\nclass {}({base}):", block.type_name());
     out.push_str(&wrapped(&format!("\"\"\"{}", block.doc().trim()), "    "));
     out.push_str("\n    Attributes\n    ----------\n");
     for field in block.fields() {
@@ -104,7 +107,8 @@ fn python() -> String {
          import numpy as np\n\
          import numpy.typing as npt\n\n\
          from nubis._block import Block, Root\n\
-         from nubis._nubis import DensityGrid\n",
+         from nubis._nubis import DensityGrid\n\
+         from nubis._sun import SunBlock\n",
     );
     let params = Params::default();
     for (_, block) in params.blocks() {

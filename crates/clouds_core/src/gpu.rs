@@ -364,6 +364,20 @@ impl Gpu {
         })
     }
 
+    /// A row of pairs of f32, to be loaded.
+    pub(crate) fn table(&self, label: &str, count: u32) -> wgpu::Texture {
+        self.device.create_texture(&wgpu::TextureDescriptor {
+            label: Some(label),
+            size: wgpu::Extent3d { width: count, height: 1, depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: wgpu::TextureFormat::Rg32Float,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+            view_formats: &[],
+        })
+    }
+
     /// A texture of one channel that is filled from here: half floats to be filtered, or f32 to be loaded.
     pub(crate) fn volume(&self, label: &str, size: [u32; 3], format: wgpu::TextureFormat) -> wgpu::Texture {
         self.device.create_texture(&wgpu::TextureDescriptor {

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::gpu::Gpu;
-use crate::params::{Model, Params, Quality, WeatherNoise};
+use crate::params::{Model, Params, Phase, Quality, WeatherNoise};
 use crate::shader::Linked;
 use wgpu::naga::{AddressSpace, Module, valid::ModuleInfo};
 
@@ -58,6 +58,8 @@ impl<'a> From<&'a wgpu::Sampler> for Binding<'a> {
 pub(crate) struct Variant {
     /// The light model.
     pub model: Model,
+    /// The phase function of the clouds.
+    pub phase: Phase,
     /// Whether the clouds are the user's grid.
     pub volume: bool,
     /// Whether that grid is read in f32.
@@ -104,6 +106,7 @@ impl Variant {
         let model = params.light.model;
         Self {
             model,
+            phase: params.light.phase,
             volume: params.volume.is_some(),
             keep_clear: params.clear_spot().1 > 0.0 && params.volume.is_none(),
             precise: quality.tolerance > 0.0 || model == Model::Path,
@@ -137,10 +140,11 @@ impl Variant {
         Self { sunlit: frame.sunlit(params), camera: frame.camera_kind, ..Self::new(params, quality) }
     }
 
-    fn constants(self) -> [(&'static str, f64); 20] {
+    fn constants(self) -> [(&'static str, f64); 21] {
         let switch = |on| f64::from(u8::from(on));
         [
             ("MODEL", f64::from(self.model as u32)),
+            ("PHASE", f64::from(self.phase as u32)),
             ("VOLUME", switch(self.volume)),
             ("KEEP_CLEAR", switch(self.keep_clear)),
             ("PRECISE", switch(self.precise)),

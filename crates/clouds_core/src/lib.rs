@@ -13,6 +13,7 @@ pub mod frame;
 pub mod generate;
 pub mod gpu;
 mod kernel;
+mod mie;
 pub mod params;
 mod passes;
 pub mod renderer;

@@ -73,6 +73,18 @@ choice! {
     }
 }
 
+choice! {
+    /// How much light a droplet scatters in which direction.
+    Phase {
+        /// Henyey and Greenstein's function of `g` (and of `g_back` in thesis2018 and vsu2022): the published models'.
+        HenyeyGreenstein = "henyey_greenstein",
+        /// Jendersie and d'Eon's fit of cloud droplets (2023): the forward peak, without bow and glory.
+        Droplet = "droplet",
+        /// Mie's own function of cloud droplets, baked: with fogbow and glory.
+        Mie = "mie",
+    }
+}
+
 params! {
     /// The sun.
     Sun {
@@ -259,6 +271,12 @@ params! {
     Light {
         /// The physics of the light in the clouds.
         model: Model = Model::Thesis2018;
+        /// The phase function: `henyey_greenstein` of `g` (in thesis2018 and vsu2022 of `g_back`, too) as published;
+        /// `droplet` a fit of real droplets, whose clouds have a silver lining (Jendersie and d'Eon 2023); `mie` the droplets
+        /// themselves, with fogbow and glory.
+        phase: Phase = Phase::HenyeyGreenstein;
+        /// Diameter of the droplets (`droplet`, `mie`): fog 5 to 20, cumulus 10 to 30, drizzle 50.
+        droplet_diameter: f32 = 20.0, in 5..=50 "µm";
         /// Mean cosine of the forward lobe of the phase function.
         g: f32 = 0.6, in -0.9999..=0.9999 "";
         /// Mean cosine of the backward lobe (thesis2018, vsu2022).
@@ -274,7 +292,8 @@ params! {
         octave_scattering: f32 = 0.91, in 0..=1 "";
         /// Share of the extinction toward the sun that each octave keeps of the one before.
         octave_extinction: f32 = 0.26, in 0..=1 "";
-        /// Share of `g` that each octave keeps of the one before.
+        /// Share of `g` that each octave keeps of the one before (of each lobe's, where the phase function is `droplet` or
+        /// `mie`).
         octave_phase: f32 = 0.25, in 0..=1 "";
         /// Gain of the sunlight in the published models, which do not conserve energy.
         sun_gain: f32 = 2.2, in 0..=1000 "";

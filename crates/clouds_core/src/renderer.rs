@@ -21,6 +21,7 @@ use crate::passes::high_clouds::{self, HighClouds};
 use crate::passes::majorant::Majorants;
 use crate::passes::march::Marched;
 use crate::passes::noise::Noise;
+use crate::passes::phase::PhaseTable;
 use crate::passes::profile::Profile;
 use crate::passes::rays::Rays;
 use crate::passes::refine::{COARSEST, Refined};
@@ -580,6 +581,7 @@ struct World {
     weather: Weather,
     broad_weather: BroadWeather,
     profile: Profile,
+    phase: PhaseTable,
     high_clouds: HighClouds,
     sky: Sky,
     volume: Volume,
@@ -602,6 +604,7 @@ impl World {
             weather: Weather::new(),
             broad_weather: BroadWeather::new(),
             profile: Profile::new(),
+            phase: PhaseTable::new(),
             high_clouds: HighClouds::new(),
             sky: Sky::new(),
             volume: Volume::new(),
@@ -631,6 +634,7 @@ impl World {
         let weather = self.weather.run(&mut ctx, params)?; // when its block or the mixture changes
         let broad_weather = self.broad_weather.run(&mut ctx, params)?; // when the larger map or its shares change
         let profile = self.profile.run(&ctx, params)?; // once for a table
+        let phase = self.phase.run(&ctx, params)?; // once for a droplet
         let high_clouds = self.high_clouds.run(&mut ctx, params, frame)?; // as they evolve
         let sky = self.sky.run(&mut ctx, params, frame, at.0)?; // when sun or air change, or the eye has gone far
 
@@ -640,7 +644,7 @@ impl World {
         let blue_noise = vec![("blue_noise", (&self.blue_noise).into())];
         let uniforms = self.uniforms.bindings();
         let mut bindings: Bindings<'_> =
-            [uniforms, noise.bindings(), weather, broad_weather, profile, high_clouds, sky, volume, blue_noise]
+            [uniforms, noise.bindings(), weather, broad_weather, profile, phase, high_clouds, sky, volume, blue_noise]
                 .concat();
         let majorants = self.majorants.run(&mut ctx, params, &bindings)?; // when paths are traced
         bindings.extend(majorants);
@@ -685,7 +689,7 @@ impl Shot {
             || old.weather.broad_extent != new.weather.broad_extent
             || weather_change(old, new) > MOST_WEATHER_CHANGE
             || old.volume != new.volume
-            || old.light.model != new.light.model
+            || (old.light.model, old.light.phase) != (new.light.model, new.light.phase)
             || old.atmosphere.planet_radius != new.atmosphere.planet_radius
     }
 }

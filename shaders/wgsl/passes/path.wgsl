@@ -90,7 +90,7 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
                 if ray.scatterings > quality.path_scatterings {
                     ray = path_ended(ray);
                 } else if sunlit {
-                    let phase = henyey_greenstein(one_minus_cos(direction, frame.sun_direction), params.light.g);
+                    let phase = path_phase(one_minus_cos(direction, frame.sun_direction));
                     ray.sunlight = ray.throughput * phase * sky_light[2].rgb;
                     ray.shadow = 1.0;
                     ray.flight = flight_from(p, frame.sun_direction);
@@ -166,13 +166,24 @@ fn scattered_on(given: PathRay, pixel: vec2u) -> PathRay {
         let angle = 2.0 * PI * u.y - PI;
         let level = cos(angle) * side + sin(angle) * cross(up, side);
         ray.direction = normalize(sqrt(1.0 - u.x) * up + sqrt(u.x) * level);
-    } else {
+    } else if PHASE == PHASE_HENYEY_GREENSTEIN {
         ray.direction = scattered(ray.direction, params.light.g, u.xy);
+    } else {
+        let sample = droplet_sample(u.xy);
+        ray.direction = turned(ray.direction, sample.x, u.y);
+        ray.throughput *= sample.y;
     }
     ray.flight = flight_from(ray.origin, ray.direction);
     ray.x = 0.0;
     ray.stage = FLIGHT;
     return ray;
+}
+
+fn path_phase(one_minus_mu: f32) -> f32 {
+    if PHASE == PHASE_HENYEY_GREENSTEIN {
+        return henyey_greenstein(one_minus_mu, params.light.g);
+    }
+    return droplet_phase(one_minus_mu);
 }
 
 // Out of the clouds: to the eye's background if it met none, else to the sky or to the ground.

@@ -7,6 +7,7 @@ pub mod majorant;
 pub mod march;
 pub mod noise;
 pub mod path;
+pub mod phase;
 pub mod points;
 pub mod profile;
 pub mod rays;

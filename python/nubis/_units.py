@@ -1,0 +1,58 @@
+"""Watts and candelas: docs/units.md."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from nubis._errors import ParameterError
+
+#: Shares of red, green and blue in the luminance, for Rec. 709 primaries (ITU-R BT.709).
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+
+#: Luminous efficacy of unfiltered sunlight from 380 to 780 nm in lm/W: 683 lm/W times the mean of
+#: V(lambda) (CIE 1931) over the spectrum of ASTM G173-03, extraterrestrial.
+LUMINOUS_EFFICACY = 202.93
+
+#: Irradiance of the sun on a plane that faces it, above the air, in W/m2 of visible light (380 to
+#: 780 nm), at the mean distance: a value for ``sun.irradiance``. From the same spectrum and the
+#: CIE 1931 observer; its luminance-weighted mean is the 656 W/m2 of that band (of 1361 in all), and
+#: times the efficacy 133 000 lx.
+SOLAR_IRRADIANCE = (719.6, 640.9, 617.8)
+
+
+def luminance(frame: npt.ArrayLike) -> npt.NDArray[np.float32]:
+    """Return the luminance of a picture in cd/m2, where its sun has `SOLAR_IRRADIANCE`.
+
+    Radiance is then in W/(m2 sr) of visible light, and `LUMINOUS_EFFICACY` times its
+    luminance-weighted mean is the luminance. Illuminance in lx comes of irradiance in the same way.
+
+    Parameters
+    ----------
+    frame : array-like, shape (..., 3) or (..., 4)
+        Linear radiance with Rec. 709 primaries, such as `Renderer.render` returns. Alpha is left
+        out.
+
+    Returns
+    -------
+    array of float32, shape (...)
+
+    Raises
+    ------
+    ParameterError
+        For an array of another shape, or what is no array of numbers.
+    """
+    try:
+        pixels = np.asarray(frame, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ParameterError(
+            f"frame = {type(frame).__name__} is not allowed: it must be an array ({error})"
+        ) from error
+    if pixels.ndim < 1 or pixels.shape[-1] not in (3, 4):
+        raise ParameterError(
+            f"frame of shape {pixels.shape} is not allowed: it must be (..., 3) or (..., 4)"
+        )
+    values: npt.NDArray[np.float32] = (LUMINOUS_EFFICACY * (pixels[..., :3] @ LUMINANCE)).astype(
+        np.float32
+    )
+    return values

@@ -24,6 +24,7 @@ from nubis._levels import presets, sky
 from nubis._nubis import Camera, DensityGrid
 from nubis._paint import paint, paint_mask
 from nubis._renderer import Adapter, Renderer, adapters, quality
+from nubis._scene_depth import distance_from_z
 from nubis._scenes import scenes
 from nubis._weather import WeatherBlend, WeatherChange
 from nubis.params import (
@@ -67,6 +68,7 @@ __all__ = [
     "WeatherChange",
     "Wind",
     "adapters",
+    "distance_from_z",
     "lerp",
     "load_map",
     "paint",

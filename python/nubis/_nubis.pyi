@@ -167,10 +167,20 @@ class Renderer:
 
     def __new__(cls, width: int, height: int, quality: Quality, adapter: str | None) -> Self: ...
     def render(
-        self, camera: Camera, params: Params, time: float, background: bool
+        self,
+        camera: Camera,
+        params: Params,
+        time: float,
+        background: bool,
+        scene_depth: npt.NDArray[np.float32] | None,
+        scene_color: npt.NDArray[np.float32] | None,
     ) -> npt.NDArray[np.float32]: ...
     def render_layers(
-        self, camera: Camera, params: Params, time: float
+        self,
+        camera: Camera,
+        params: Params,
+        time: float,
+        scene_depth: npt.NDArray[np.float32] | None,
     ) -> tuple[
         npt.NDArray[np.float32],
         npt.NDArray[np.float32],

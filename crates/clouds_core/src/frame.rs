@@ -188,6 +188,11 @@ params! {
         high_update: [f32; 4] = [0.0; 4];
         /// The same for the small ones.
         high_update_small: [f32; 4] = [0.0; 4];
+
+        /// 1 where there is a scene of the user's, for which kernels are compiled.
+        scene: u32 = 0;
+        /// 1 where its radiance is known.
+        scene_lit: u32 = 0;
     }
 }
 

@@ -78,6 +78,8 @@ pub(crate) struct Variant {
     pub broad: bool,
     /// Whether the profile by height is the user's table.
     pub profile_table: bool,
+    /// Whether there is a scene of the user's.
+    pub scene: bool,
     /// Whether there are light samples that see the detail.
     pub light_detail: bool,
     /// Whether there are light samples that do not.
@@ -114,6 +116,7 @@ impl Variant {
             upper: params.has_upper_clouds(),
             broad: params.has_broad_weather(),
             profile_table: params.clouds.profile.is_some() && params.volume.is_none(),
+            scene: false,
             light_detail: quality.cheap_light > 0.0,
             light_cheap: quality.cheap_light < 1.0 || quality.far_sample,
             // What single passes ask for beside.
@@ -134,10 +137,15 @@ impl Variant {
 
     /// What a picture needs that is seen in a frame.
     pub fn of_frame(params: &Params, quality: &Quality, frame: &Frame) -> Self {
-        Self { sunlit: frame.sunlit(params), camera: frame.camera_kind, ..Self::new(params, quality) }
+        Self {
+            sunlit: frame.sunlit(params),
+            camera: frame.camera_kind,
+            scene: frame.scene > 0,
+            ..Self::new(params, quality)
+        }
     }
 
-    fn constants(self) -> [(&'static str, f64); 20] {
+    fn constants(self) -> [(&'static str, f64); 21] {
         let switch = |on| f64::from(u8::from(on));
         [
             ("MODEL", f64::from(self.model as u32)),
@@ -151,6 +159,7 @@ impl Variant {
             ("UPPER", switch(self.upper)),
             ("BROAD_WEATHER", switch(self.broad)),
             ("PROFILE_TABLE", switch(self.profile_table)),
+            ("SCENE", switch(self.scene)),
             ("LIGHT_DETAIL", switch(self.light_detail)),
             ("LIGHT_CHEAP", switch(self.light_cheap)),
             ("CAMERA", f64::from(self.camera)),

@@ -16,6 +16,7 @@ mod kernel;
 pub mod params;
 mod passes;
 pub mod renderer;
+pub mod scene_depth;
 pub mod schema;
 pub mod shader;
 pub mod volume;

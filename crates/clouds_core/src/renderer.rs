@@ -30,6 +30,7 @@ use crate::passes::sun_volume::SunVolume;
 use crate::passes::volume::Volume;
 use crate::passes::weather::Weather;
 use crate::passes::{Bindings, Context, Scene, Uniforms, composite, march, path, points, reference, refine, reproject};
+use crate::scene_depth::{SceneDepth, SceneTextures};
 use crate::shader::Linked;
 use crate::wind::Carried;
 
@@ -213,7 +214,9 @@ impl Renderer {
     /// A still: finished in one call, without history or noise to wait for.
     ///
     /// With `background` the image is the radiance of the whole sky with alpha 1; without it the clouds alone,
-    /// premultiplied, alpha 1 minus their transmittance. `all` fills the other layers of the picture too.
+    /// premultiplied, alpha 1 minus their transmittance. `all` fills the other layers of the picture too. A `scene_depth`
+    /// hides what is behind it; with its radiance it is a part of the picture, without it alpha leaves room for it.
+    #[expect(clippy::too_many_arguments, reason = "what a still depends on")]
     pub fn render(
         &mut self,
         camera: &Camera,
@@ -221,9 +224,10 @@ impl Renderer {
         time: f64,
         background: bool,
         all: bool,
+        scene_depth: Option<SceneDepth<'_>>,
         interrupt: Interrupt<'_>,
     ) -> Result<Picture> {
-        self.still(camera, params, time, background, all, 0, interrupt)
+        self.still(camera, params, time, background, all, 0, scene_depth, interrupt)
     }
 
     /// A still; `first_sample` is the number of the first path of each pixel.
@@ -236,9 +240,14 @@ impl Renderer {
         background: bool,
         all: bool,
         first_sample: u32,
+        scene_depth: Option<SceneDepth<'_>>,
         interrupt: Interrupt<'_>,
     ) -> Result<Picture> {
         let (mut frame, params) = self.begin(camera, params, time)?;
+        scene_depth.map_or(Ok(()), |scene| scene.check(self.size))?;
+        frame.scene = u32::from(scene_depth.is_some());
+        let colored = scene_depth.is_some_and(|scene| scene.color.is_some());
+        frame.scene_lit = u32::from(colored);
         let params = &params;
         frame.background = u32::from(background);
         frame.first_sample = first_sample;
@@ -246,11 +255,16 @@ impl Renderer {
         frame.cloudless = u32::from(method.is_cloudless(params));
         let Self { gpu, world, quality, timings, .. } = self;
         let variant = Variant::of_frame(params, quality, &frame);
+        let [width, height] = self.size;
+        let sheet_pixels = scene_depth.map_or(0, |_| u64::from(width) * u64::from(largest_sheet(self.size, method)));
+        if !world.scene_depth.holds(sheet_pixels, colored) {
+            world.scene_depth = SceneTextures::new(gpu, sheet_pixels, colored);
+        }
+        let world = &mut *world;
         let scene = gpu.compiling(&method.kernels(params, quality, &frame, variant, all), || {
             world.run(gpu, params, &frame, (camera.eye, time), quality, timings, interrupt)
         })?;
 
-        let [width, height] = self.size;
         let lattice = refine::coarsest(&frame, quality) > 1;
         let mut picture = Picture::default();
         for sheet in sheets([width, height], method) {
@@ -264,6 +278,10 @@ impl Renderer {
                 self.still = Some(Still::new(gpu, pixels, method));
             }
             let Some(still) = &self.still else { unreachable!("was just made") };
+            if let Some(given) = &scene_depth {
+                let first = sheet.start as usize * width as usize;
+                scene.scene_depth.upload(gpu, given, first..first + pixels as usize);
+            }
 
             let mut ctx = Context { gpu, uniforms: scene.uniforms, variant: scene.variant, timings, interrupt };
             match (method, &still.rays) {
@@ -422,7 +440,7 @@ impl Renderer {
             Some(last) if params.light.model != Model::Path => last.image,
             last => {
                 let first_sample = count.wrapping_mul(self.quality.path_samples);
-                let fresh = self.still(camera, params, time, background, false, first_sample, interrupt)?.image;
+                let fresh = self.still(camera, params, time, background, false, first_sample, None, interrupt)?.image;
                 let share = 1.0 / (count as f32 + 1.0);
                 match last {
                     Some(last) => last.image.iter().zip(&fresh).map(|(old, new)| old + share * (new - old)).collect(),
@@ -585,6 +603,7 @@ struct World {
     volume: Volume,
     majorants: Majorants,
     sun_volume: SunVolume,
+    scene_depth: SceneTextures,
     /// Names and bytes of all of it, as it was bound last.
     memory: Vec<(&'static str, u64)>,
 }
@@ -607,6 +626,7 @@ impl World {
             volume: Volume::new(),
             majorants: Majorants::new(),
             sun_volume: SunVolume::new(),
+            scene_depth: SceneTextures::new(gpu, 0, false),
             memory: Vec::new(),
         }
     }
@@ -646,9 +666,10 @@ impl World {
         bindings.extend(majorants);
         let sun_volume = self.sun_volume.run(&mut ctx, params, frame, at, &bindings)?; // as clouds and eye move
         bindings.extend(sun_volume);
+        bindings.extend(self.scene_depth.bindings());
         let held = bindings.iter().filter(|(_, binding)| !matches!(binding, Binding::Sampler(_)));
         self.memory = held.map(|(name, binding)| (*name, binding.bytes())).collect();
-        Ok(Scene { uniforms: &self.uniforms, variant, bindings })
+        Ok(Scene { uniforms: &self.uniforms, variant, bindings, scene_depth: &self.scene_depth })
     }
 }
 
@@ -711,6 +732,12 @@ const BAND_SECONDS: f64 = 0.1;
 const SHEET_PIXELS: u32 = 1 << 20;
 /// Most rays that are on their way together where they take many dispatches.
 const SHEET_RAYS: u32 = 1 << 14;
+
+/// Most rows of what the buffers of a sheet hold.
+fn largest_sheet(size: [u32; 2], method: Method) -> u32 {
+    let shared = u32::from(method == Method::March);
+    sheets(size, method).map(|sheet| sheet.len() as u32 + shared).max().unwrap_or(1)
+}
 
 /// The rows of each sheet of a still.
 fn sheets([width, height]: [u32; 2], method: Method) -> impl Iterator<Item = Range<u32>> {

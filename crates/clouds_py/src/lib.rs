@@ -11,6 +11,7 @@ use clouds_core::camera::{Camera as CoreCamera, Convention, Projection};
 use clouds_core::gpu::{self, lock};
 use clouds_core::params::{Params, Quality};
 use clouds_core::renderer::Renderer as CoreRenderer;
+use clouds_core::scene_depth::SceneDepth;
 use clouds_core::schema::Value;
 use clouds_core::{DensityGrid as CoreGrid, Error, Result, cache, color, files, params, schema};
 use glam::DVec3;
@@ -389,6 +390,16 @@ impl Renderer {
     }
 }
 
+/// The user's scene, from arrays that Python has checked.
+fn scene_from_python<'a>(
+    depth: Option<&'a PyReadonlyArrayDyn<'_, f32>>,
+    color: Option<&'a PyReadonlyArrayDyn<'_, f32>>,
+) -> PyResult<Option<SceneDepth<'a>>> {
+    let Some(depth) = depth else { return Ok(None) };
+    let color = color.map(|color| color.as_slice()).transpose()?;
+    Ok(Some(SceneDepth { distance: depth.as_slice()?, color }))
+}
+
 #[pymethods]
 impl Renderer {
     #[new]
@@ -412,10 +423,14 @@ impl Renderer {
         params: &Bound<'_, PyAny>,
         time: f64,
         background: bool,
+        scene_depth: Option<PyReadonlyArrayDyn<'py, f32>>,
+        scene_color: Option<PyReadonlyArrayDyn<'py, f32>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let params: Params = params_from_python(params)?;
-        let picture =
-            detached(py, |interrupt| lock(&self.core).render(&camera.0, &params, time, background, false, interrupt))?;
+        let scene = scene_from_python(scene_depth.as_ref(), scene_color.as_ref())?;
+        let picture = detached(py, |interrupt| {
+            lock(&self.core).render(&camera.0, &params, time, background, false, scene, interrupt)
+        })?;
         array(py, picture.image, &self.shape(&[4]))
     }
 
@@ -425,10 +440,12 @@ impl Renderer {
         camera: Camera,
         params: &Bound<'_, PyAny>,
         time: f64,
+        scene_depth: Option<PyReadonlyArrayDyn<'py, f32>>,
     ) -> PyResult<Bound<'py, PyTuple>> {
         let params: Params = params_from_python(params)?;
+        let scene = scene_from_python(scene_depth.as_ref(), None)?;
         let picture =
-            detached(py, |interrupt| lock(&self.core).render(&camera.0, &params, time, false, true, interrupt))?;
+            detached(py, |interrupt| lock(&self.core).render(&camera.0, &params, time, false, true, scene, interrupt))?;
         let image = array(py, picture.image, &self.shape(&[4]))?;
         let sky = array(py, picture.sky, &self.shape(&[4]))?;
         let depth = array(py, picture.depth, &self.shape(&[]))?;

@@ -4,6 +4,7 @@
 #import atmosphere
 #import light
 #import high_layer
+#import scene_depth
 
 override HIGH: bool = true; // there are high clouds
 override HIGH_EMBOSS: bool = false; // they are embossed, and the sun shines on them
@@ -18,6 +19,9 @@ const SUN_RADIUS = 0.004654;
 // wrong too, and long enough that a level ray, which meets 50 times the layer, changes by 25 % a metre at the default.
 const HIGH_FADE = 100.0;
 
+// Luminance of Rec. 709 red, green and blue.
+const LUMINANCE = vec3f(0.2126, 0.7152, 0.0722);
+
 // A sheet of light and shade at a distance, or several as one.
 struct Layer {
     radiance: vec3f, // premultiplied
@@ -31,7 +35,8 @@ fn composite(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let index = (frame.first_row + id.y - frame.sheet_row) * frame.width + id.x;
-    let view = view_direction(vec2f(f32(id.x), f32(frame.first_row + id.y)) + 0.5);
+    let pixel = vec2u(id.x, frame.first_row + id.y);
+    let view = view_direction(vec2f(pixel) + 0.5);
     if view.w == 0.0 {
         image[index] = vec4f(0.0);
         if LAYERS {
@@ -41,6 +46,7 @@ fn composite(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let direction = view.xyz;
+    let scene = scene_distance(pixel);
     let ground = hit_sphere(direction, frame.power_ground);
     let air = Air(sky_radiance(direction), whole_air(direction, ground));
 
@@ -59,7 +65,7 @@ fn composite(@builtin(global_invocation_id) id: vec3u) {
         var crossing = select(0, 1, frame.power_high <= 0.0);
         loop {
             let at = select(high.near, high.far, crossing == 1);
-            let hit = high.hit && at > 0.0 && !(ground.enters && at > ground.near);
+            let hit = high.hit && at > 0.0 && at < scene && !(ground.enters && at > ground.near);
             let layer = through_air(high_layer(direction, at, hit), params.high_clouds.altitude, air);
             if at < here.distance {
                 before = over(before, layer);
@@ -82,14 +88,25 @@ fn composite(@builtin(global_invocation_id) id: vec3u) {
     } else if params.sun.visible > 0u {
         background += air.transmittance * sun_disc(direction);
     }
+    var opacity = 1.0;
+    if SCENE && scene < NO_SCENE {
+        let bright = scene_radiance(pixel);
+        let altitude = altitude_at(scene * direction);
+        background = through_air(Layer(bright, 0.0, scene), altitude, air).radiance;
+        if frame.scene_lit == 0u {
+            // The caller puts a scene of his own behind: what he adds is dimmed by cloud and air.
+            let white = through_air(Layer(vec3f(1.0), 0.0, scene), altitude, air).radiance;
+            opacity = 1.0 - seen.transmittance * dot(white - background, LUMINANCE);
+        }
+    }
 
     if LAYERS {
         sky[index] = vec4f(background, 1.0);
-        let opacity = 1.0 - seen.transmittance;
-        depth[index] = select(-1.0, seen.distance / opacity, opacity > 0.0);
+        let covered = 1.0 - seen.transmittance;
+        depth[index] = select(-1.0, seen.distance / covered, covered > 0.0);
     }
     if frame.background > 0u {
-        image[index] = vec4f(seen.radiance + seen.transmittance * background, 1.0);
+        image[index] = vec4f(seen.radiance + seen.transmittance * background, opacity);
     } else {
         image[index] = vec4f(seen.radiance, 1.0 - seen.transmittance);
     }

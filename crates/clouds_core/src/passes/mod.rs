@@ -24,6 +24,7 @@ use crate::frame::Frame;
 use crate::gpu::{Download, Gpu, Interrupt, Timings, texture_bytes};
 use crate::kernel::{Binding, Variant};
 use crate::params::{self, Params, Quality};
+use crate::scene_depth::SceneTextures;
 use crate::schema::{self, Block as _};
 use crate::shader::Linked;
 
@@ -44,6 +45,7 @@ pub(crate) struct Scene<'a> {
     pub uniforms: &'a Uniforms,
     pub variant: Variant,
     pub bindings: Bindings<'a>,
+    pub scene_depth: &'a SceneTextures,
 }
 
 /// The uniform blocks on the GPU.

@@ -26,6 +26,7 @@ from nubis._paint import paint, paint_mask
 from nubis._renderer import Adapter, Renderer, adapters, quality
 from nubis._scene_depth import distance_from_z
 from nubis._scenes import scenes
+from nubis._shadow import ShadowMap, SunVisibility
 from nubis._weather import WeatherBlend, WeatherChange
 from nubis.params import (
     Atmosphere,
@@ -60,7 +61,9 @@ __all__ = [
     "Params",
     "Quality",
     "Renderer",
+    "ShadowMap",
     "Sun",
+    "SunVisibility",
     "UpperClouds",
     "Wander",
     "Weather",

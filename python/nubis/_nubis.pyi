@@ -200,6 +200,20 @@ class Renderer:
     def sun_transmittance(
         self, points: npt.ArrayLike, params: Params, time: float
     ) -> npt.NDArray[np.float32]: ...
+    def depth_along(
+        self, camera: Camera, directions: npt.ArrayLike, params: Params, time: float
+    ) -> npt.NDArray[np.float32]:
+        """Optical depth of all clouds from the eye; -1 where the ground is in the way."""
+
+    def shadow_map(
+        self,
+        params: Params,
+        time: float,
+        center: tuple[float, float],
+        altitude: float,
+        extent: float,
+        size: int,
+    ) -> npt.NDArray[np.float32]: ...
     def weather_map(self, params: Params) -> npt.NDArray[np.float32]:
         """Coverage, type and precipitation as the march reads them, shape (H, W, 3)."""
 

@@ -50,6 +50,10 @@ override LIGHT_CHEAP: bool = true; // there are light samples that do not
 @group(0) @binding(60) var scene_depth: texture_2d<f32>; // m along the ray
 @group(0) @binding(61) var scene_color: texture_2d<f32>; // its radiance
 
+// Direct sun on the ground around the eye: levels in a stack, and, while they are baked, the mean of the last (passes/shadow).
+@group(0) @binding(62) var ground_shadow: texture_2d<f32>;
+@group(0) @binding(63) var ground_shadow_mean: texture_2d<f32>;
+
 // One entry a pixel, row by row.
 @group(0) @binding(12) var<storage, read_write> clouds: array<vec4f>; // premultiplied radiance, transmittance
 @group(0) @binding(13) var<storage, read_write> cloud_depth: array<f32>; // m to the mean scattering point, -1 where none
@@ -138,6 +142,7 @@ struct PathRay {
 @group(0) @binding(45) var mix_c: texture_2d<f32>;
 @group(0) @binding(46) var mix_d: texture_2d<f32>;
 @group(0) @binding(47) var<uniform> mix_shares: vec4f;
+@group(0) @binding(64) var<storage, read_write> shadow_out: array<f32>; // the user's shadow map, row by row
 @group(0) @binding(25) var map_out: texture_storage_2d<rgba16float, write>;
 
 // Queries at points, and probes of shader functions.

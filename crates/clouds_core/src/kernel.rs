@@ -94,6 +94,8 @@ pub(crate) struct Variant {
     pub high_low_sun: bool,
     /// Whether nothing has been marched, for `composite`.
     pub cloudless: bool,
+    /// Whether clouds cast shadows on the ground in sight, for `composite`.
+    pub ground_shadow: bool,
     /// Whether the sky and the depth are asked for, for `composite`.
     pub layers: bool,
     /// Which noises a weather map is baked from, for `weather`.
@@ -125,6 +127,7 @@ impl Variant {
             high_emboss: false,
             high_low_sun: false,
             cloudless: false,
+            ground_shadow: false,
             layers: false,
             weather_noise: WeatherNoise::WorleyPerlin,
         }
@@ -145,7 +148,7 @@ impl Variant {
         }
     }
 
-    fn constants(self) -> [(&'static str, f64); 21] {
+    fn constants(self) -> [(&'static str, f64); 22] {
         let switch = |on| f64::from(u8::from(on));
         [
             ("MODEL", f64::from(self.model as u32)),
@@ -167,6 +170,7 @@ impl Variant {
             ("HIGH_EMBOSS", switch(self.high_emboss)),
             ("HIGH_LOW_SUN", switch(self.high_low_sun)),
             ("CLOUDLESS", switch(self.cloudless)),
+            ("GROUND_SHADOW", switch(self.ground_shadow)),
             ("LAYERS", switch(self.layers)),
             ("WEATHER_NOISE", f64::from(self.weather_noise as u32)),
         ]

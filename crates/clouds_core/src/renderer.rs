@@ -25,6 +25,7 @@ use crate::passes::profile::Profile;
 use crate::passes::rays::Rays;
 use crate::passes::refine::{COARSEST, Refined};
 use crate::passes::reproject::{ORDER, STRIDE};
+use crate::passes::shadow::{self, GroundShadow};
 use crate::passes::sky::Sky;
 use crate::passes::sun_volume::SunVolume;
 use crate::passes::volume::Volume;
@@ -45,6 +46,7 @@ pub struct Renderer {
     refining: Option<Refining>,
     march_pace: Pace,
     pixel_pace: Pace,
+    shadow_pace: Pace,
     /// Milliseconds on the GPU by kernel, for the last picture or answer.
     pub timings: Timings,
 }
@@ -174,6 +176,8 @@ impl Renderer {
             refining: None,
             march_pace: pace,
             pixel_pace: pace,
+            // Its texels may take many times as long as a pixel's march.
+            shadow_pace: Pace::new(if gpu.info.kind == "cpu" { 1e4 } else { 1e6 }),
             timings: Timings::default(),
             size: [width, height],
             quality,
@@ -251,6 +255,7 @@ impl Renderer {
         let params = &params;
         frame.background = u32::from(background);
         frame.first_sample = first_sample;
+        frame.ground_shadow = u32::from((background || all) && frame.has_ground_shadow(camera, params));
         let method = Method::new(params, &self.quality);
         frame.cloudless = u32::from(method.is_cloudless(params));
         let Self { gpu, world, quality, timings, .. } = self;
@@ -348,6 +353,7 @@ impl Renderer {
         let (mut frame, params) = self.begin(camera, params, time)?;
         let params = &params;
         frame.background = u32::from(background);
+        frame.ground_shadow = u32::from(background && frame.has_ground_shadow(camera, params));
         frame.cloudless = u32::from(Method::March.is_cloudless(params));
         let [width, height] = self.size;
         let pixels = u64::from(width) * u64::from(height);
@@ -490,6 +496,24 @@ impl Renderer {
         self.ask("sun_transmittance_at_points", at, params, time, interrupt)
     }
 
+    /// The optical depth of all clouds from an eye along directions; -1 where the ground is in the way.
+    pub fn depth_along(
+        &mut self,
+        eye: DVec3,
+        directions: &[[f64; 3]],
+        params: &Params,
+        time: f64,
+        interrupt: Interrupt<'_>,
+    ) -> Result<Vec<f32>> {
+        check_fork()?;
+        let camera = Camera::equirect(eye)?;
+        let points: Vec<_> =
+            directions.iter().map(|d| DVec3::from_array(*d).as_vec3().normalize().extend(0.0).to_array()).collect();
+        let kernel = self.gpu.kernel("points", "depth_along_directions", Variant::new(params, &self.quality))?;
+        let answers = self.run_points(&kernel, &camera, &points, params, time, points::CHUNK, interrupt)?;
+        Ok(answers.iter().map(|answer| answer[0]).collect())
+    }
+
     fn ask(
         &mut self,
         entry: &str,
@@ -508,6 +532,49 @@ impl Renderer {
         let kernel = self.gpu.kernel("points", entry, Variant::new(params, &self.quality))?;
         let answers = self.run_points(&kernel, &camera, &points, params, time, points::CHUNK, interrupt)?;
         Ok(answers.iter().map(|answer| answer[0]).collect())
+    }
+
+    /// The share of direct sunlight that reaches a level square at an `altitude` around `center`: `size` by `size` numbers,
+    /// row 0 in the north. `extent` is its side, m.
+    #[expect(clippy::too_many_arguments, reason = "where and how fine the map is")]
+    pub fn shadow_map(
+        &mut self,
+        params: &Params,
+        time: f64,
+        center: [f64; 2],
+        altitude: f64,
+        extent: f64,
+        size: u32,
+        interrupt: Interrupt<'_>,
+    ) -> Result<Vec<f32>> {
+        if !(1..=MOST_SHADOW).contains(&size) {
+            return Err(Error::parameter("size", size, format!("a whole number from 1 to {MOST_SHADOW}")));
+        }
+        // Written so that NaN fails it.
+        if !(1.0..=1e7).contains(&extent) {
+            return Err(Error::parameter("extent", extent, "from 1 to 10000000 m"));
+        }
+        if !(-1e5..=1e5).contains(&altitude) {
+            return Err(Error::parameter("altitude", altitude, "from -100000 to 100000 m"));
+        }
+        if let Some(place) = center.into_iter().find(|v| !(-1e8..=1e8).contains(v)) {
+            return Err(Error::parameter("center", place, "2 numbers from -100000000 to 100000000 m"));
+        }
+        let camera = Camera::equirect(DVec3::new(center[0], center[1], altitude))?;
+        let (frame, params) = self.begin(&camera, params, time)?;
+        let params = &params;
+        let Self { gpu, world, quality, timings, .. } = self;
+        let scene = world.run(gpu, params, &frame, (camera.eye, time), quality, timings, interrupt)?;
+        let shadow_texel = (extent / f64::from(size)) as f32;
+        let mut frame = Frame { width: size, height: size, march_width: size, sheet_rows: size, shadow_texel, ..frame };
+        let mut ctx = Context { gpu, uniforms: scene.uniforms, variant: scene.variant, timings, interrupt };
+        let room = shadow::room(gpu, size);
+        let mut map = Vec::with_capacity(size as usize * size as usize);
+        in_bands(&mut self.shadow_pace, gpu, &scene, &mut frame, [size, size], |frame| {
+            map.extend(shadow::map(&mut ctx, &scene, frame, &room)?);
+            Ok(())
+        })?;
+        Ok(map)
     }
 
     /// The weather map as the march reads it, baked, the user's own or mixed: its width and height in texels, and three
@@ -603,6 +670,7 @@ struct World {
     volume: Volume,
     majorants: Majorants,
     sun_volume: SunVolume,
+    ground_shadow: GroundShadow,
     scene_depth: SceneTextures,
     /// Names and bytes of all of it, as it was bound last.
     memory: Vec<(&'static str, u64)>,
@@ -626,6 +694,7 @@ impl World {
             volume: Volume::new(),
             majorants: Majorants::new(),
             sun_volume: SunVolume::new(),
+            ground_shadow: GroundShadow::new(),
             scene_depth: SceneTextures::new(gpu, 0, false),
             memory: Vec::new(),
         }
@@ -666,6 +735,8 @@ impl World {
         bindings.extend(majorants);
         let sun_volume = self.sun_volume.run(&mut ctx, params, frame, at, &bindings)?; // as clouds and eye move
         bindings.extend(sun_volume);
+        let ground_shadow = self.ground_shadow.run(&mut ctx, params, frame, at, &bindings)?; // as those, where it is seen
+        bindings.extend(ground_shadow);
         bindings.extend(self.scene_depth.bindings());
         let held = bindings.iter().filter(|(_, binding)| !matches!(binding, Binding::Sampler(_)));
         self.memory = held.map(|(name, binding)| (*name, binding.bytes())).collect();
@@ -724,6 +795,9 @@ fn weather_change(old: &Params, new: &Params) -> f32 {
     };
     1.0 - new.weather_shares().into_iter().map(kept).sum::<f32>()
 }
+
+/// Most texels along a side of the user's shadow map.
+const MOST_SHADOW: u32 = 8192;
 
 /// What a submission should take, in seconds: short enough for every GPU's watchdog and for Ctrl-C, long enough that
 /// submitting costs nothing.

@@ -501,6 +501,40 @@ impl Renderer {
         Ok(PyArray1::from_vec(py, answers))
     }
 
+    fn depth_along<'py>(
+        &self,
+        py: Python<'py>,
+        camera: Camera,
+        directions: &Bound<'_, PyAny>,
+        params: &Bound<'_, PyAny>,
+        time: f64,
+    ) -> PyResult<Bound<'py, PyArray1<f32>>> {
+        let directions = points_from_python(py, directions)?;
+        let params: Params = params_from_python(params)?;
+        let answers = detached(py, |interrupt| {
+            lock(&self.core).depth_along(camera.0.eye, &directions, &params, time, interrupt)
+        })?;
+        Ok(PyArray1::from_vec(py, answers))
+    }
+
+    #[expect(clippy::too_many_arguments, reason = "where and how fine the map is")]
+    fn shadow_map<'py>(
+        &self,
+        py: Python<'py>,
+        params: &Bound<'_, PyAny>,
+        time: f64,
+        center: [f64; 2],
+        altitude: f64,
+        extent: f64,
+        size: u32,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let params: Params = params_from_python(params)?;
+        let map = detached(py, |interrupt| {
+            lock(&self.core).shadow_map(&params, time, center, altitude, extent, size, interrupt)
+        })?;
+        array(py, map, &[size as usize, size as usize])
+    }
+
     fn weather_map<'py>(&self, py: Python<'py>, params: &Bound<'_, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let params: Params = params_from_python(params)?;
         let ([width, height], texels) = detached(py, |interrupt| lock(&self.core).weather_map(&params, interrupt))?;

@@ -5,11 +5,13 @@
 #import light
 #import high_layer
 #import scene_depth
+#import ground_shadow
 
 override HIGH: bool = true; // there are high clouds
 override HIGH_EMBOSS: bool = false; // they are embossed, and the sun shines on them
 override HIGH_LOW_SUN: bool = true; // the sun is so low that it shines on each of them in its own way
 override CLOUDLESS: bool = false; // nothing has been marched
+override GROUND_SHADOW: bool = false; // clouds cast shadows on the ground in sight
 override LAYERS: bool = true; // the sky and the depth are asked for
 
 // The sun's angular radius, 0.2666 degrees (IAU: 695 700 km at 1 au).
@@ -83,7 +85,10 @@ fn composite(@builtin(global_invocation_id) id: vec3u) {
     var background = air.radiance;
     if ground.enters {
         let p = ground.near * direction;
-        let lit = select(vec3f(0.0), ground_radiance(cos_zenith_at(p, frame.sun_direction)), params.atmosphere.enabled > 0u);
+        var lit = select(vec3f(0.0), ground_radiance(cos_zenith_at(p, frame.sun_direction)), params.atmosphere.enabled > 0u);
+        if GROUND_SHADOW {
+            lit = ground_in_shadow(lit, p);
+        }
         background += air.transmittance * lit;
     } else if params.sun.visible > 0u {
         background += air.transmittance * sun_disc(direction);
@@ -110,6 +115,22 @@ fn composite(@builtin(global_invocation_id) id: vec3u) {
     } else {
         image[index] = vec4f(seen.radiance, 1.0 - seen.transmittance);
     }
+}
+
+// The ground without the sun that clouds keep from it.
+fn ground_in_shadow(lit: vec3f, p: vec3f) -> vec3f {
+    let mu = cos_zenith_at(p, frame.sun_direction);
+    var sun = 1.0;
+    if !CLOUDLESS {
+        sun = baked_ground_sun(p);
+    }
+    if HIGH {
+        sun *= exp(-high_depth_over(p, mu));
+    }
+    // As in `ground_radiance`.
+    let up = max(mu, 0.0);
+    let direct = params.sun.irradiance * air_transmittance_up(0.0, up) * sun_above_ground(0.0, mu) * up;
+    return max(lit - (1.0 - sun) * params.atmosphere.ground_albedo / PI * direct, vec3f(0.0));
 }
 
 // All the air along a ray, up to the ground or to space.

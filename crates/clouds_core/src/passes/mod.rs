@@ -13,6 +13,7 @@ pub mod rays;
 pub mod reference;
 pub mod refine;
 pub mod reproject;
+pub mod shadow;
 pub mod sky;
 pub mod sun_volume;
 pub mod volume;

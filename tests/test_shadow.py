@@ -296,7 +296,7 @@ def test_sun_visibility_behind_an_edge():
         return ours.sun_visibility(camera, params).direct
 
     # At 1000 m the disc is 9.3 m wide.
-    assert direct(0.0, 10.0) == pytest.approx(0.5, abs=0.015)
+    assert direct(0.0, 10.0) == pytest.approx(0.5, abs=0.02)
     assert direct(-6.0, 10.0) == 1 and direct(6.0, 10.0) < 1e-6
     # A pixel of 1.9 degrees is 33 m wide there: 6 m from the edge a third is hidden.
     assert direct(-6.0, 124.6) == pytest.approx(0.5 + 6 / (1000 * 2 * 1.9044 / 100), abs=0.05)

@@ -17,7 +17,7 @@ Vectors = npt.NDArray[np.float64]
 # The sun's angular radius, 0.2666 degrees (IAU: 695 700 km at 1 au).
 SUN_RADIUS = 0.004654
 # Points of the disc, each moved by a part of a pixel's width: a sharp edge across the disc is right to
-# 0.01.
+# 0.02.
 DISC_POINTS = 256
 # How much of the light into a cloud of optical depth 1 turns back: 3/4 (1 - g) by two streams
 # without absorption, with g = 0.85 of droplets (Hansen 1971).
@@ -82,8 +82,8 @@ def world_from_map(
     return matrix
 
 
-def disc(params: Params, camera: Camera, size: tuple[int, int]) -> Vectors:
-    """Directions spread evenly over the sun's disc, each moved within a pixel around it."""
+def disc(params: Params, pixel: float) -> Vectors:
+    """Directions spread evenly over the sun's disc, each moved within a pixel of that angle."""
     sun = sun_direction(params)
     side = np.cross(sun, [0, 0, 1] if abs(sun[2]) < 0.9 else [1, 0, 0])
     side /= np.linalg.norm(side)
@@ -91,7 +91,7 @@ def disc(params: Params, camera: Camera, size: tuple[int, int]) -> Vectors:
     i = np.arange(DISC_POINTS) + 0.5
     # Vogel's spiral, and for the pixel a low-discrepancy sequence (R2).
     angle, radius = i * math.pi * (3 - math.sqrt(5)), SUN_RADIUS * np.sqrt(i / DISC_POINTS)
-    within = pixel_angle(camera, size) * (np.outer(i, [0.7548776662, 0.5698402910]) % 1 - 0.5)
+    within = pixel * (np.outer(i, [0.7548776662, 0.5698402910]) % 1 - 0.5)
     x = radius * np.cos(angle) + within[:, 0]
     y = radius * np.sin(angle) + within[:, 1]
     directions = sun + x[:, None] * side + y[:, None] * over
@@ -146,9 +146,11 @@ def seen_sun(
     size: tuple[int, int],
 ) -> SunVisibility:
     """The sun through the clouds, the mean over its disc."""
-    directions = disc(params, camera, size)
-    depth = core.depth_along(camera, directions, params, time).astype(np.float64)
-    up = depth >= 0
+    # The ground hides what is below the horizon of the disc alone, however wide pixels are.
+    points, directions = disc(params, 0.0), disc(params, pixel_angle(camera, size))
+    depths = core.depth_along(camera, np.concatenate([points, directions]), params, time)
+    bare, moved = depths.astype(np.float64).reshape(2, -1)
+    up, depth = bare >= 0, np.where(moved >= 0, moved, bare)
     direct = np.where(up, np.exp(-depth.clip(0)), 0)
     scattered = np.where(up, 1 / (1 + TURNED_BACK * depth.clip(0)), 0) - direct
     if scene_depth is not None:

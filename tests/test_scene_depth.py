@@ -1,5 +1,7 @@
 """A user's scene among the clouds: `scene_depth` and `scene_color`."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -156,25 +158,29 @@ def test_air_before_the_scene_is_a_part_of_all_air():
     params = params.with_(**{"clouds.coverage": 0.0, "high_clouds.coverage": 0.0})
     ours = nubis.Renderer(16, 9, quality="draft")
     seen = [
-        ours.render(camera, params, scene_depth=np.full((9, 16), d), scene_color=np.zeros((9, 16, 3)))
+        ours.render(
+            camera, params, scene_depth=np.full((9, 16), d), scene_color=np.zeros((9, 16, 3))
+        )
         for d in (0.0, 1e3, 1e4, 1e5)
     ]
     assert (seen[0][..., :3] < 1e-6).all()
-    assert all((a[..., :3] <= b[..., :3]).all() for a, b in zip(seen, seen[1:], strict=False))
+    assert all((a[..., :3] <= b[..., :3]).all() for a, b in pairwise(seen))
     above = np.s_[:3]  # the rows that see no ground
     sky = ours.render(camera, params)
     assert (seen[3][above][..., :3] <= 1.001 * sky[above][..., :3]).all()
 
 
 def test_partial_cover_is_a_mixture():
-    """A pixel that is covered in part is so much of the covered picture and the rest of the open."""
+    """A pixel covered in part is so much of the covered picture and the rest of the open one."""
     camera, params = nubis.scenes["fair_weather"]
     ours = nubis.Renderer(64, 36, quality=nubis.quality("draft").replace(contrast=0.0))
     rng = np.random.default_rng(5)
     cover = rng.uniform(0, 1, (36, 64)) * (rng.uniform(size=(36, 64)) < 0.8)
     cover[rng.uniform(size=(36, 64)) < 0.2] = 1.0
     depth = np.full((36, 64), 4000.0)
-    color = np.concatenate([np.full((36, 64, 3), 0.7) * cover[..., None], cover[..., None]], axis=-1)
+    color = np.concatenate(
+        [np.full((36, 64, 3), 0.7) * cover[..., None], cover[..., None]], axis=-1
+    )
     frame = ours.render(camera, params, scene_depth=depth, scene_color=color)
     full = ours.render(camera, params, scene_depth=depth, scene_color=np.full((36, 64, 3), 0.7))
     none = ours.render(camera, params)
@@ -244,7 +250,11 @@ def test_distance_from_z():
         (np.ones(SIZE[::-1]), np.zeros((*SIZE[::-1], 2)), "scene_color = array of shape"),
         (np.ones(SIZE[::-1]), np.full((*SIZE[::-1], 3), np.inf), r"scene_color\[0, 0, 0\] = inf"),
         (np.ones(SIZE[::-1]), np.full((*SIZE[::-1], 3), -0.5), r"scene_color\[0, 0, 0\] = -0.5"),
-        (np.ones(SIZE[::-1]), np.full((*SIZE[::-1], 4), 1.5), r"scene_color\[..., 3\]\[0, 0\] = 1.5"),
+        (
+            np.ones(SIZE[::-1]),
+            np.full((*SIZE[::-1], 4), 1.5),
+            r"scene_color\[..., 3\]\[0, 0\] = 1.5",
+        ),
     ],
 )
 def test_what_is_no_scene(renderer, depth, color, message):

@@ -194,12 +194,14 @@ def test_shadows_of_a_grid():
     under = (np.abs(points[:, 0]) < 400) & (np.abs(points[:, 1] - 3500) < 400)
     beside = (np.abs(points[:, 0]) > 800) | (np.abs(points[:, 1] - 3500) > 800)
     for time in (0.0, 3.0):
-        ratio = (seen_ground(DOWN, params, time) / seen_ground(DOWN, params, time, **off)).mean(axis=1)
+        ratio = (seen_ground(DOWN, params, time) / seen_ground(DOWN, params, time, **off)).mean(
+            axis=1
+        )
         assert ratio[under].max() < 0.4 and ratio[beside].min() > 0.999
 
 
 def test_switched_off_nothing_is_kept_from_the_ground():
-    """Then clouds change nothing of the sky behind them; and without clouds shadows change nothing."""
+    """Then clouds change nothing of what is behind them; nor do shadows without clouds."""
     params = nubis.scenes["fair_weather"][1]
     clear = {"clouds.coverage": 0.0, "high_clouds.coverage": 0.0}
     off = {"atmosphere.ground_shadows": False}
@@ -336,7 +338,7 @@ def test_sun_visibility_over_ground_and_scene():
     corner = np.full((90, 90), np.inf)
     corner[:20] = 100.0
     assert direct(20.0, scene_depth=corner) == 1
-    # All kinds of cameras find the sun's pixel: a scene there alone hides it, elsewhere it does not.
+    # All kinds of cameras find the sun's pixel: a scene there hides it, elsewhere it does not.
     for camera in (
         nubis.Camera.equirect((0, 0, 1)),
         nubis.Camera.fisheye((0, 0, 1)),

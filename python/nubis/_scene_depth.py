@@ -109,4 +109,5 @@ def distance_from_z(camera: Camera, z: npt.ArrayLike) -> Array:
     tan = math.tan(math.radians(camera.fov) / 2)
     x = (2 * (np.arange(width) + 0.5) / width - 1) * tan * width / height
     y = (1 - 2 * (np.arange(height) + 0.5) / height) * tan
-    return (array * np.sqrt(1 + x**2 + y[:, None] ** 2)).astype(np.float32)
+    distance: Array = (array * np.sqrt(1 + x**2 + y[:, None] ** 2)).astype(np.float32)
+    return distance

@@ -16,8 +16,8 @@ Vectors = npt.NDArray[np.float64]
 
 # The sun's angular radius, 0.2666 degrees (IAU: 695 700 km at 1 au).
 SUN_RADIUS = 0.004654
-# Points of the disc, each moved by a part of a pixel's width: a sharp edge across the disc is right to
-# 0.02.
+# Points of the disc, each moved by a part of a pixel's width: a sharp edge across the disc is right
+# to 0.02.
 DISC_POINTS = 256
 # How much of the light into a cloud of optical depth 1 turns back: 3/4 (1 - g) by two streams
 # without absorption, with g = 0.85 of droplets (Hansen 1971).
@@ -64,7 +64,8 @@ def sun_direction(params: Params) -> Vectors:
     elevation, azimuth = math.radians(params.sun.elevation), math.radians(params.sun.azimuth)
     level = math.cos(elevation)
     return np.array(
-        [math.sin(azimuth) * level, math.cos(azimuth) * level, math.sin(elevation)], dtype=np.float64
+        [math.sin(azimuth) * level, math.cos(azimuth) * level, math.sin(elevation)],
+        dtype=np.float64,
     )
 
 

@@ -416,6 +416,7 @@ impl Renderer {
         Ok(Self { core: Mutex::new(core), width, height })
     }
 
+    #[expect(clippy::too_many_arguments, reason = "what a still depends on")]
     fn render<'py>(
         &self,
         py: Python<'py>,

@@ -25,7 +25,9 @@ from nubis._levels import presets, sky
 from nubis._nubis import Camera, DensityGrid
 from nubis._paint import paint, paint_mask
 from nubis._renderer import Adapter, Renderer, adapters, quality
+from nubis._scene_depth import distance_from_z
 from nubis._scenes import scenes
+from nubis._shadow import ShadowMap, SunVisibility
 from nubis._units import LUMINOUS_EFFICACY, SOLAR_IRRADIANCE, luminance
 from nubis._weather import WeatherBlend, WeatherChange
 from nubis.params import (
@@ -64,7 +66,9 @@ __all__ = [
     "Params",
     "Quality",
     "Renderer",
+    "ShadowMap",
     "Sun",
+    "SunVisibility",
     "UpperClouds",
     "Wander",
     "Weather",
@@ -73,6 +77,7 @@ __all__ = [
     "Wind",
     "adapters",
     "auto_exposure",
+    "distance_from_z",
     "lerp",
     "load_map",
     "luminance",

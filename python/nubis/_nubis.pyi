@@ -167,10 +167,20 @@ class Renderer:
 
     def __new__(cls, width: int, height: int, quality: Quality, adapter: str | None) -> Self: ...
     def render(
-        self, camera: Camera, params: Params, time: float, background: bool
+        self,
+        camera: Camera,
+        params: Params,
+        time: float,
+        background: bool,
+        scene_depth: npt.NDArray[np.float32] | None,
+        scene_color: npt.NDArray[np.float32] | None,
     ) -> npt.NDArray[np.float32]: ...
     def render_layers(
-        self, camera: Camera, params: Params, time: float
+        self,
+        camera: Camera,
+        params: Params,
+        time: float,
+        scene_depth: npt.NDArray[np.float32] | None,
     ) -> tuple[
         npt.NDArray[np.float32],
         npt.NDArray[np.float32],
@@ -189,6 +199,20 @@ class Renderer:
     ) -> npt.NDArray[np.float32]: ...
     def sun_transmittance(
         self, points: npt.ArrayLike, params: Params, time: float
+    ) -> npt.NDArray[np.float32]: ...
+    def depth_along(
+        self, camera: Camera, directions: npt.ArrayLike, params: Params, time: float
+    ) -> npt.NDArray[np.float32]:
+        """Optical depth of all clouds from the eye; -1 where the ground is in the way."""
+
+    def shadow_map(
+        self,
+        params: Params,
+        time: float,
+        center: tuple[float, float],
+        altitude: float,
+        extent: float,
+        size: int,
     ) -> npt.NDArray[np.float32]: ...
     def weather_map(self, params: Params) -> npt.NDArray[np.float32]:
         """Coverage, type and precipitation as the march reads them, shape (H, W, 3)."""

@@ -451,6 +451,8 @@ class Atmosphere(Block):
     aerial_perspective : float
         How much air stands between the eye and the clouds: 1 is physical, 0 none. Allowed: a number
         from 0 to 10.
+    ground_shadows : bool
+        Whether clouds cast shadows on the ground that is seen. Allowed: True or False.
     ground_albedo : tuple[float, float, float]
         Albedo of the ground. Allowed: 3 numbers from 0 to 1.
     """
@@ -459,6 +461,7 @@ class Atmosphere(Block):
     planet_radius: float = 6371000.0
     haze: float = 1.0
     aerial_perspective: float = 1.0
+    ground_shadows: bool = True
     ground_albedo: tuple[float, float, float] = (0.1, 0.12, 0.07)
 
 

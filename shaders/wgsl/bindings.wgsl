@@ -16,6 +16,7 @@ override RAIN_SHAFTS: bool = true; // rain is seen below the clouds
 override UPPER: bool = true; // there is a second deck
 override BROAD_WEATHER: bool = true; // a larger map shifts the weather
 override PROFILE_TABLE: bool = false; // the profile by height is the user's table
+override SCENE: bool = false; // there is a scene of the user's among the clouds
 override LIGHT_DETAIL: bool = true; // there are light samples that see the detail
 override LIGHT_CHEAP: bool = true; // there are light samples that do not
 
@@ -46,6 +47,14 @@ override LIGHT_CHEAP: bool = true; // there are light samples that do not
 @group(0) @binding(31) var volume_exact: texture_3d<f32>; // the same in f32, which cannot be filtered everywhere
 @group(0) @binding(32) var majorants: texture_3d<f32>; // what the density nearby never exceeds (passes/majorant)
 @group(0) @binding(40) var sun_volume: texture_3d<f32>; // exp(-rate * optical depth to the sun) (passes/sun_volume)
+
+// The user's scene, a texel for each pixel of the sheet, row after row (scene_depth.wgsl).
+@group(0) @binding(60) var scene_depth: texture_2d<f32>; // m along the ray
+@group(0) @binding(61) var scene_color: texture_2d<f32>; // its radiance
+
+// Direct sun on the ground around the eye: levels in a stack, and, while they are baked, the mean of the last (passes/shadow).
+@group(0) @binding(62) var ground_shadow: texture_2d<f32>;
+@group(0) @binding(63) var ground_shadow_mean: texture_2d<f32>;
 
 // One entry a pixel, row by row.
 @group(0) @binding(12) var<storage, read_write> clouds: array<vec4f>; // premultiplied radiance, transmittance
@@ -135,6 +144,7 @@ struct PathRay {
 @group(0) @binding(45) var mix_c: texture_2d<f32>;
 @group(0) @binding(46) var mix_d: texture_2d<f32>;
 @group(0) @binding(47) var<uniform> mix_shares: vec4f;
+@group(0) @binding(64) var<storage, read_write> shadow_out: array<f32>; // the user's shadow map, row by row
 @group(0) @binding(25) var map_out: texture_storage_2d<rgba16float, write>;
 
 // Queries at points, and probes of shader functions.

@@ -30,7 +30,7 @@ impl Scene {
     }
 
     fn still(&mut self) {
-        self.renderer.render(&self.camera, &self.params, self.time, true, false, &|| Ok(())).expect("renders");
+        self.renderer.render(&self.camera, &self.params, self.time, true, false, None, &|| Ok(())).expect("renders");
     }
 
     /// The next frame of an animation in which clouds and camera move.

@@ -2,13 +2,14 @@
 //! its digits in f32 (planet radii, long times, distant eyes) is worked out here in f64.
 
 use std::f32::consts::PI;
+use std::f64::consts::FRAC_PI_2;
 
 use glam::{DVec2, DVec3, Vec3};
 
 use crate::camera::{Camera, Projection};
 use crate::params;
 use crate::params::{Edge, Params};
-use crate::passes::{broad_weather, sun_volume};
+use crate::passes::{broad_weather, shadow, sun_volume};
 use crate::wind::Carried;
 
 params! {
@@ -192,6 +193,17 @@ params! {
         high_update: [f32; 4] = [0.0; 4];
         /// The same for the small ones.
         high_update_small: [f32; 4] = [0.0; 4];
+
+        /// 1 where there is a scene of the user's, for which kernels are compiled.
+        scene: u32 = 0;
+        /// 1 where its radiance is known.
+        scene_lit: u32 = 0;
+        /// 1 where clouds cast shadows on the ground in sight, for which `composite` is compiled.
+        ground_shadow: u32 = 0;
+        /// Side of a texel of the user's shadow map, or of the finest level of the ground's (ground_shadow.wgsl), m.
+        shadow_texel: f32 = 1.0;
+        /// Where the eye is in those levels, after the wind, m from their middle.
+        shadow_eye: [f32; 2] = [0.0; 2];
     }
 }
 
@@ -268,6 +280,8 @@ impl Frame {
         frame.set_volume(camera.eye, params);
         frame.sun_volume_rows = sun_volume::rows(params);
         frame.sun_volume_eye = sun_volume::eye_in(camera.eye, params, time);
+        frame.shadow_texel = shadow::texel(frame.altitude);
+        frame.shadow_eye = shadow::eye_in(camera.eye, params, time);
         frame.high_clouds = u32::from(params.high_clouds.coverage > 0.0);
         frame.sun_direction = sun_direction(params).as_vec3().to_array();
         frame.set_high_sun(params);
@@ -294,6 +308,39 @@ impl Frame {
         let cosine = Vec3::from_array(self.zenith).dot(Vec3::from_array(self.sun_direction));
         // The sun's half degree, and what f32 may be off.
         f64::from(cosine) - horizon > -0.005 - 1e-5 && params.sun.irradiance != [0.0; 3]
+    }
+
+    /// Whether clouds cast shadows on the ground that `camera` sees.
+    pub fn has_ground_shadow(&self, camera: &Camera, params: &Params) -> bool {
+        let clouds = params.has_clouds() || params.high_clouds.coverage > 0.0;
+        let air = &params.atmosphere;
+        // As far around the planet as the horizon is, the sun stands higher by as much.
+        let sine = f64::from(Vec3::from_array(self.zenith).dot(Vec3::from_array(self.sun_direction)));
+        let up = sine.clamp(-1.0, 1.0).asin() > -f64::from(self.horizon_dip) - HALF_SUN;
+        let lit = up && params.sun.irradiance != [0.0; 3] && air.ground_albedo != [0.0; 3];
+        air.ground_shadows && air.enabled && clouds && lit && self.sees_ground(camera)
+    }
+
+    /// Whether any ray of a picture goes below the horizon, or within half a degree of it.
+    fn sees_ground(&self, camera: &Camera) -> bool {
+        let down = -Vec3::from_array(self.zenith).as_dvec3();
+        let horizon = FRAC_PI_2 - f64::from(self.horizon_dip) + 0.01;
+        let below = |ray: DVec3| ray.normalize().dot(down).clamp(-1.0, 1.0).acos() < horizon;
+        let half = match camera.projection {
+            Projection::Equirect => return true,
+            Projection::Fisheye => {
+                return camera.forward.dot(down).clamp(-1.0, 1.0).acos() - f64::from(self.half_fov) < horizon;
+            }
+            Projection::Perspective => f64::from(self.tan_half_fov),
+        };
+        let wide = half * f64::from(self.width) / f64::from(self.height);
+        let ray = |x: f64, y: f64| camera.forward + x * wide * camera.right + y * half * camera.up;
+        let steps = || (0..=32).map(|i| f64::from(i) / 16.0 - 1.0);
+        // Straight down is in the picture, or the lowest ray is on its rim.
+        let ahead = camera.forward.dot(down);
+        let nadir = [camera.right.dot(down) / wide, camera.up.dot(down) / half];
+        (ahead > 0.0 && nadir.iter().all(|v| v.abs() <= ahead))
+            || steps().any(|s| [ray(s, -1.0), ray(s, 1.0), ray(-1.0, s), ray(1.0, s)].into_iter().any(below))
     }
 
     /// What the sun asks of the high clouds.

@@ -80,6 +80,8 @@ pub(crate) struct Variant {
     pub broad: bool,
     /// Whether the profile by height is the user's table.
     pub profile_table: bool,
+    /// Whether there is a scene of the user's.
+    pub scene: bool,
     /// Whether there are light samples that see the detail.
     pub light_detail: bool,
     /// Whether there are light samples that do not.
@@ -94,6 +96,8 @@ pub(crate) struct Variant {
     pub high_low_sun: bool,
     /// Whether nothing has been marched, for `composite`.
     pub cloudless: bool,
+    /// Whether clouds cast shadows on the ground in sight, for `composite`.
+    pub ground_shadow: bool,
     /// Whether the sky and the depth are asked for, for `composite`.
     pub layers: bool,
     /// Which noises a weather map is baked from, for `weather`.
@@ -117,6 +121,7 @@ impl Variant {
             upper: params.has_upper_clouds(),
             broad: params.has_broad_weather(),
             profile_table: params.clouds.profile.is_some() && params.volume.is_none(),
+            scene: false,
             light_detail: quality.cheap_light > 0.0,
             light_cheap: quality.cheap_light < 1.0 || quality.far_sample,
             // What single passes ask for beside.
@@ -125,6 +130,7 @@ impl Variant {
             high_emboss: false,
             high_low_sun: false,
             cloudless: false,
+            ground_shadow: false,
             layers: false,
             weather_noise: WeatherNoise::WorleyPerlin,
         }
@@ -137,10 +143,15 @@ impl Variant {
 
     /// What a picture needs that is seen in a frame.
     pub fn of_frame(params: &Params, quality: &Quality, frame: &Frame) -> Self {
-        Self { sunlit: frame.sunlit(params), camera: frame.camera_kind, ..Self::new(params, quality) }
+        Self {
+            sunlit: frame.sunlit(params),
+            camera: frame.camera_kind,
+            scene: frame.scene > 0,
+            ..Self::new(params, quality)
+        }
     }
 
-    fn constants(self) -> [(&'static str, f64); 21] {
+    fn constants(self) -> [(&'static str, f64); 23] {
         let switch = |on| f64::from(u8::from(on));
         [
             ("MODEL", f64::from(self.model as u32)),
@@ -155,6 +166,7 @@ impl Variant {
             ("UPPER", switch(self.upper)),
             ("BROAD_WEATHER", switch(self.broad)),
             ("PROFILE_TABLE", switch(self.profile_table)),
+            ("SCENE", switch(self.scene)),
             ("LIGHT_DETAIL", switch(self.light_detail)),
             ("LIGHT_CHEAP", switch(self.light_cheap)),
             ("CAMERA", f64::from(self.camera)),
@@ -162,6 +174,7 @@ impl Variant {
             ("HIGH_EMBOSS", switch(self.high_emboss)),
             ("HIGH_LOW_SUN", switch(self.high_low_sun)),
             ("CLOUDLESS", switch(self.cloudless)),
+            ("GROUND_SHADOW", switch(self.ground_shadow)),
             ("LAYERS", switch(self.layers)),
             ("WEATHER_NOISE", f64::from(self.weather_noise as u32)),
         ]

@@ -17,6 +17,7 @@ mod mie;
 pub mod params;
 mod passes;
 pub mod renderer;
+pub mod scene_depth;
 pub mod schema;
 pub mod shader;
 pub mod volume;

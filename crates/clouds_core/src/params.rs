@@ -323,6 +323,8 @@ params! {
         haze: f32 = 1.0, in 0..=20 "";
         /// How much air stands between the eye and the clouds: 1 is physical, 0 none.
         aerial_perspective: f32 = 1.0, in 0..=10 "";
+        /// Whether clouds cast shadows on the ground that is seen.
+        ground_shadows: bool = true;
         /// Albedo of the ground.
         ground_albedo: [f32; 3] = [0.10, 0.12, 0.07], in 0..=1 "";
     }

@@ -26,11 +26,13 @@ use crate::passes::profile::Profile;
 use crate::passes::rays::Rays;
 use crate::passes::refine::{COARSEST, Refined};
 use crate::passes::reproject::{ORDER, STRIDE};
+use crate::passes::shadow::{self, GroundShadow};
 use crate::passes::sky::Sky;
 use crate::passes::sun_volume::SunVolume;
 use crate::passes::volume::Volume;
 use crate::passes::weather::Weather;
 use crate::passes::{Bindings, Context, Scene, Uniforms, composite, march, path, points, reference, refine, reproject};
+use crate::scene_depth::{SceneDepth, SceneTextures};
 use crate::shader::Linked;
 use crate::wind::Carried;
 
@@ -45,6 +47,7 @@ pub struct Renderer {
     refining: Option<Refining>,
     march_pace: Pace,
     pixel_pace: Pace,
+    shadow_pace: Pace,
     /// Milliseconds on the GPU by kernel, for the last picture or answer.
     pub timings: Timings,
 }
@@ -174,6 +177,8 @@ impl Renderer {
             refining: None,
             march_pace: pace,
             pixel_pace: pace,
+            // Its texels may take many times as long as a pixel's march.
+            shadow_pace: Pace::new(if gpu.info.kind == "cpu" { 1e4 } else { 1e6 }),
             timings: Timings::default(),
             size: [width, height],
             quality,
@@ -214,7 +219,9 @@ impl Renderer {
     /// A still: finished in one call, without history or noise to wait for.
     ///
     /// With `background` the image is the radiance of the whole sky with alpha 1; without it the clouds alone,
-    /// premultiplied, alpha 1 minus their transmittance. `all` fills the other layers of the picture too.
+    /// premultiplied, alpha 1 minus their transmittance. `all` fills the other layers of the picture too. A `scene_depth`
+    /// hides what is behind it; with its radiance it is a part of the picture, without it alpha leaves room for it.
+    #[expect(clippy::too_many_arguments, reason = "what a still depends on")]
     pub fn render(
         &mut self,
         camera: &Camera,
@@ -222,9 +229,10 @@ impl Renderer {
         time: f64,
         background: bool,
         all: bool,
+        scene_depth: Option<SceneDepth<'_>>,
         interrupt: Interrupt<'_>,
     ) -> Result<Picture> {
-        self.still(camera, params, time, background, all, 0, interrupt)
+        self.still(camera, params, time, background, all, 0, scene_depth, interrupt)
     }
 
     /// A still; `first_sample` is the number of the first path of each pixel.
@@ -237,21 +245,32 @@ impl Renderer {
         background: bool,
         all: bool,
         first_sample: u32,
+        scene_depth: Option<SceneDepth<'_>>,
         interrupt: Interrupt<'_>,
     ) -> Result<Picture> {
         let (mut frame, params) = self.begin(camera, params, time)?;
+        scene_depth.map_or(Ok(()), |scene| scene.check(self.size))?;
+        frame.scene = u32::from(scene_depth.is_some());
+        let colored = scene_depth.is_some_and(|scene| scene.color.is_some());
+        frame.scene_lit = u32::from(colored);
         let params = &params;
         frame.background = u32::from(background);
         frame.first_sample = first_sample;
+        frame.ground_shadow = u32::from((background || all) && frame.has_ground_shadow(camera, params));
         let method = Method::new(params, &self.quality);
         frame.cloudless = u32::from(method.is_cloudless(params));
         let Self { gpu, world, quality, timings, .. } = self;
         let variant = Variant::of_frame(params, quality, &frame);
+        let [width, height] = self.size;
+        let sheet_pixels = scene_depth.map_or(0, |_| u64::from(width) * u64::from(largest_sheet(self.size, method)));
+        if !world.scene_depth.holds(sheet_pixels, colored) {
+            world.scene_depth = SceneTextures::new(gpu, sheet_pixels, colored);
+        }
+        let world = &mut *world;
         let scene = gpu.compiling(&method.kernels(params, quality, &frame, variant, all), || {
             world.run(gpu, params, &frame, (camera.eye, time), quality, timings, interrupt)
         })?;
 
-        let [width, height] = self.size;
         let lattice = refine::coarsest(&frame, quality) > 1;
         let mut picture = Picture::default();
         for sheet in sheets([width, height], method) {
@@ -265,6 +284,10 @@ impl Renderer {
                 self.still = Some(Still::new(gpu, pixels, method));
             }
             let Some(still) = &self.still else { unreachable!("was just made") };
+            if let Some(given) = &scene_depth {
+                let first = sheet.start as usize * width as usize;
+                scene.scene_depth.upload(gpu, given, first..first + pixels as usize);
+            }
 
             let mut ctx = Context { gpu, uniforms: scene.uniforms, variant: scene.variant, timings, interrupt };
             match (method, &still.rays) {
@@ -331,6 +354,7 @@ impl Renderer {
         let (mut frame, params) = self.begin(camera, params, time)?;
         let params = &params;
         frame.background = u32::from(background);
+        frame.ground_shadow = u32::from(background && frame.has_ground_shadow(camera, params));
         frame.cloudless = u32::from(Method::March.is_cloudless(params));
         let [width, height] = self.size;
         let pixels = u64::from(width) * u64::from(height);
@@ -423,7 +447,7 @@ impl Renderer {
             Some(last) if params.light.model != Model::Path => last.image,
             last => {
                 let first_sample = count.wrapping_mul(self.quality.path_samples);
-                let fresh = self.still(camera, params, time, background, false, first_sample, interrupt)?.image;
+                let fresh = self.still(camera, params, time, background, false, first_sample, None, interrupt)?.image;
                 let share = 1.0 / (count as f32 + 1.0);
                 match last {
                     Some(last) => last.image.iter().zip(&fresh).map(|(old, new)| old + share * (new - old)).collect(),
@@ -473,6 +497,24 @@ impl Renderer {
         self.ask("sun_transmittance_at_points", at, params, time, interrupt)
     }
 
+    /// The optical depth of all clouds from an eye along directions; -1 where the ground is in the way.
+    pub fn depth_along(
+        &mut self,
+        eye: DVec3,
+        directions: &[[f64; 3]],
+        params: &Params,
+        time: f64,
+        interrupt: Interrupt<'_>,
+    ) -> Result<Vec<f32>> {
+        check_fork()?;
+        let camera = Camera::equirect(eye)?;
+        let points: Vec<_> =
+            directions.iter().map(|d| DVec3::from_array(*d).as_vec3().normalize().extend(0.0).to_array()).collect();
+        let kernel = self.gpu.kernel("points", "depth_along_directions", Variant::new(params, &self.quality))?;
+        let answers = self.run_points(&kernel, &camera, &points, params, time, points::CHUNK, interrupt)?;
+        Ok(answers.iter().map(|answer| answer[0]).collect())
+    }
+
     fn ask(
         &mut self,
         entry: &str,
@@ -491,6 +533,49 @@ impl Renderer {
         let kernel = self.gpu.kernel("points", entry, Variant::new(params, &self.quality))?;
         let answers = self.run_points(&kernel, &camera, &points, params, time, points::CHUNK, interrupt)?;
         Ok(answers.iter().map(|answer| answer[0]).collect())
+    }
+
+    /// The share of direct sunlight that reaches a level square at an `altitude` around `center`: `size` by `size` numbers,
+    /// row 0 in the north. `extent` is its side, m.
+    #[expect(clippy::too_many_arguments, reason = "where and how fine the map is")]
+    pub fn shadow_map(
+        &mut self,
+        params: &Params,
+        time: f64,
+        center: [f64; 2],
+        altitude: f64,
+        extent: f64,
+        size: u32,
+        interrupt: Interrupt<'_>,
+    ) -> Result<Vec<f32>> {
+        if !(1..=MOST_SHADOW).contains(&size) {
+            return Err(Error::parameter("size", size, format!("a whole number from 1 to {MOST_SHADOW}")));
+        }
+        // Written so that NaN fails it.
+        if !(1.0..=1e7).contains(&extent) {
+            return Err(Error::parameter("extent", extent, "from 1 to 10000000 m"));
+        }
+        if !(-1e5..=1e5).contains(&altitude) {
+            return Err(Error::parameter("altitude", altitude, "from -100000 to 100000 m"));
+        }
+        if let Some(place) = center.into_iter().find(|v| !(-1e8..=1e8).contains(v)) {
+            return Err(Error::parameter("center", place, "2 numbers from -100000000 to 100000000 m"));
+        }
+        let camera = Camera::equirect(DVec3::new(center[0], center[1], altitude))?;
+        let (frame, params) = self.begin(&camera, params, time)?;
+        let params = &params;
+        let Self { gpu, world, quality, timings, .. } = self;
+        let scene = world.run(gpu, params, &frame, (camera.eye, time), quality, timings, interrupt)?;
+        let shadow_texel = (extent / f64::from(size)) as f32;
+        let mut frame = Frame { width: size, height: size, march_width: size, sheet_rows: size, shadow_texel, ..frame };
+        let mut ctx = Context { gpu, uniforms: scene.uniforms, variant: scene.variant, timings, interrupt };
+        let room = shadow::room(gpu, size);
+        let mut map = Vec::with_capacity(size as usize * size as usize);
+        in_bands(&mut self.shadow_pace, gpu, &scene, &mut frame, [size, size], |frame| {
+            map.extend(shadow::map(&mut ctx, &scene, frame, &room)?);
+            Ok(())
+        })?;
+        Ok(map)
     }
 
     /// The weather map as the march reads it, baked, the user's own or mixed: its width and height in texels, and three
@@ -587,6 +672,8 @@ struct World {
     volume: Volume,
     majorants: Majorants,
     sun_volume: SunVolume,
+    ground_shadow: GroundShadow,
+    scene_depth: SceneTextures,
     /// Names and bytes of all of it, as it was bound last.
     memory: Vec<(&'static str, u64)>,
 }
@@ -610,6 +697,8 @@ impl World {
             volume: Volume::new(),
             majorants: Majorants::new(),
             sun_volume: SunVolume::new(),
+            ground_shadow: GroundShadow::new(),
+            scene_depth: SceneTextures::new(gpu, 0, false),
             memory: Vec::new(),
         }
     }
@@ -650,9 +739,12 @@ impl World {
         bindings.extend(majorants);
         let sun_volume = self.sun_volume.run(&mut ctx, params, frame, at, &bindings)?; // as clouds and eye move
         bindings.extend(sun_volume);
+        let ground_shadow = self.ground_shadow.run(&mut ctx, params, frame, at, &bindings)?; // as those, where it is seen
+        bindings.extend(ground_shadow);
+        bindings.extend(self.scene_depth.bindings());
         let held = bindings.iter().filter(|(_, binding)| !matches!(binding, Binding::Sampler(_)));
         self.memory = held.map(|(name, binding)| (*name, binding.bytes())).collect();
-        Ok(Scene { uniforms: &self.uniforms, variant, bindings })
+        Ok(Scene { uniforms: &self.uniforms, variant, bindings, scene_depth: &self.scene_depth })
     }
 }
 
@@ -708,6 +800,9 @@ fn weather_change(old: &Params, new: &Params) -> f32 {
     1.0 - new.weather_shares().into_iter().map(kept).sum::<f32>()
 }
 
+/// Most texels along a side of the user's shadow map.
+const MOST_SHADOW: u32 = 8192;
+
 /// What a submission should take, in seconds: short enough for every GPU's watchdog and for Ctrl-C, long enough that
 /// submitting costs nothing.
 const BAND_SECONDS: f64 = 0.1;
@@ -715,6 +810,12 @@ const BAND_SECONDS: f64 = 0.1;
 const SHEET_PIXELS: u32 = 1 << 20;
 /// Most rays that are on their way together where they take many dispatches.
 const SHEET_RAYS: u32 = 1 << 14;
+
+/// Most rows of what the buffers of a sheet hold.
+fn largest_sheet(size: [u32; 2], method: Method) -> u32 {
+    let shared = u32::from(method == Method::March);
+    sheets(size, method).map(|sheet| sheet.len() as u32 + shared).max().unwrap_or(1)
+}
 
 /// The rows of each sheet of a still.
 fn sheets([width, height]: [u32; 2], method: Method) -> impl Iterator<Item = Range<u32>> {

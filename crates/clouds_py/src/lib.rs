@@ -11,6 +11,7 @@ use clouds_core::camera::{Camera as CoreCamera, Convention, Projection};
 use clouds_core::gpu::{self, lock};
 use clouds_core::params::{Params, Quality};
 use clouds_core::renderer::Renderer as CoreRenderer;
+use clouds_core::scene_depth::SceneDepth;
 use clouds_core::schema::Value;
 use clouds_core::{DensityGrid as CoreGrid, Error, Result, cache, color, files, params, schema};
 use glam::DVec3;
@@ -389,6 +390,16 @@ impl Renderer {
     }
 }
 
+/// The user's scene, from arrays that Python has checked.
+fn scene_from_python<'a>(
+    depth: Option<&'a PyReadonlyArrayDyn<'_, f32>>,
+    color: Option<&'a PyReadonlyArrayDyn<'_, f32>>,
+) -> PyResult<Option<SceneDepth<'a>>> {
+    let Some(depth) = depth else { return Ok(None) };
+    let color = color.map(|color| color.as_slice()).transpose()?;
+    Ok(Some(SceneDepth { distance: depth.as_slice()?, color }))
+}
+
 #[pymethods]
 impl Renderer {
     #[new]
@@ -405,6 +416,7 @@ impl Renderer {
         Ok(Self { core: Mutex::new(core), width, height })
     }
 
+    #[expect(clippy::too_many_arguments, reason = "what a still depends on")]
     fn render<'py>(
         &self,
         py: Python<'py>,
@@ -412,10 +424,14 @@ impl Renderer {
         params: &Bound<'_, PyAny>,
         time: f64,
         background: bool,
+        scene_depth: Option<PyReadonlyArrayDyn<'py, f32>>,
+        scene_color: Option<PyReadonlyArrayDyn<'py, f32>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let params: Params = params_from_python(params)?;
-        let picture =
-            detached(py, |interrupt| lock(&self.core).render(&camera.0, &params, time, background, false, interrupt))?;
+        let scene = scene_from_python(scene_depth.as_ref(), scene_color.as_ref())?;
+        let picture = detached(py, |interrupt| {
+            lock(&self.core).render(&camera.0, &params, time, background, false, scene, interrupt)
+        })?;
         array(py, picture.image, &self.shape(&[4]))
     }
 
@@ -425,10 +441,12 @@ impl Renderer {
         camera: Camera,
         params: &Bound<'_, PyAny>,
         time: f64,
+        scene_depth: Option<PyReadonlyArrayDyn<'py, f32>>,
     ) -> PyResult<Bound<'py, PyTuple>> {
         let params: Params = params_from_python(params)?;
+        let scene = scene_from_python(scene_depth.as_ref(), None)?;
         let picture =
-            detached(py, |interrupt| lock(&self.core).render(&camera.0, &params, time, false, true, interrupt))?;
+            detached(py, |interrupt| lock(&self.core).render(&camera.0, &params, time, false, true, scene, interrupt))?;
         let image = array(py, picture.image, &self.shape(&[4]))?;
         let sky = array(py, picture.sky, &self.shape(&[4]))?;
         let depth = array(py, picture.depth, &self.shape(&[]))?;
@@ -482,6 +500,40 @@ impl Renderer {
         let params: Params = params_from_python(params)?;
         let answers = detached(py, |interrupt| lock(&self.core).sun_transmittance(&points, &params, time, interrupt))?;
         Ok(PyArray1::from_vec(py, answers))
+    }
+
+    fn depth_along<'py>(
+        &self,
+        py: Python<'py>,
+        camera: Camera,
+        directions: &Bound<'_, PyAny>,
+        params: &Bound<'_, PyAny>,
+        time: f64,
+    ) -> PyResult<Bound<'py, PyArray1<f32>>> {
+        let directions = points_from_python(py, directions)?;
+        let params: Params = params_from_python(params)?;
+        let answers = detached(py, |interrupt| {
+            lock(&self.core).depth_along(camera.0.eye, &directions, &params, time, interrupt)
+        })?;
+        Ok(PyArray1::from_vec(py, answers))
+    }
+
+    #[expect(clippy::too_many_arguments, reason = "where and how fine the map is")]
+    fn shadow_map<'py>(
+        &self,
+        py: Python<'py>,
+        params: &Bound<'_, PyAny>,
+        time: f64,
+        center: [f64; 2],
+        altitude: f64,
+        extent: f64,
+        size: u32,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let params: Params = params_from_python(params)?;
+        let map = detached(py, |interrupt| {
+            lock(&self.core).shadow_map(&params, time, center, altitude, extent, size, interrupt)
+        })?;
+        array(py, map, &[size as usize, size as usize])
     }
 
     fn weather_map<'py>(&self, py: Python<'py>, params: &Bound<'_, PyAny>) -> PyResult<Bound<'py, PyAny>> {

@@ -4,11 +4,14 @@
 #import atmosphere
 #import light
 #import high_layer
+#import scene_depth
+#import ground_shadow
 
 override HIGH: bool = true; // there are high clouds
 override HIGH_EMBOSS: bool = false; // they are embossed, and the sun shines on them
 override HIGH_LOW_SUN: bool = true; // the sun is so low that it shines on each of them in its own way
 override CLOUDLESS: bool = false; // nothing has been marched
+override GROUND_SHADOW: bool = false; // clouds cast shadows on the ground in sight
 override LAYERS: bool = true; // the sky and the depth are asked for
 
 // The sun's angular radius, 0.2666 degrees (IAU: 695 700 km at 1 au).
@@ -17,6 +20,9 @@ const SUN_RADIUS = 0.004654;
 // Height above or below the high clouds at which an eye sees all of them, m. Short, as a place in the sky without them is
 // wrong too, and long enough that a level ray, which meets 50 times the layer, changes by 25 % a metre at the default.
 const HIGH_FADE = 100.0;
+
+// Luminance of Rec. 709 red, green and blue.
+const LUMINANCE = vec3f(0.2126, 0.7152, 0.0722);
 
 // A sheet of light and shade at a distance, or several as one.
 struct Layer {
@@ -31,7 +37,8 @@ fn composite(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let index = (frame.first_row + id.y - frame.sheet_row) * frame.width + id.x;
-    let view = view_direction(vec2f(f32(id.x), f32(frame.first_row + id.y)) + 0.5);
+    let pixel = vec2u(id.x, frame.first_row + id.y);
+    let view = view_direction(vec2f(pixel) + 0.5);
     if view.w == 0.0 {
         image[index] = vec4f(0.0);
         if LAYERS {
@@ -41,6 +48,7 @@ fn composite(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let direction = view.xyz;
+    let scene = scene_distance(pixel);
     let ground = hit_sphere(direction, frame.power_ground);
     let air = Air(sky_radiance(direction), whole_air(direction, ground));
 
@@ -59,7 +67,7 @@ fn composite(@builtin(global_invocation_id) id: vec3u) {
         var crossing = select(0, 1, frame.power_high <= 0.0);
         loop {
             let at = select(high.near, high.far, crossing == 1);
-            let hit = high.hit && at > 0.0 && !(ground.enters && at > ground.near);
+            let hit = high.hit && at > 0.0 && at < scene && !(ground.enters && at > ground.near);
             let layer = through_air(high_layer(direction, at, hit), params.high_clouds.altitude, air);
             if at < here.distance {
                 before = over(before, layer);
@@ -77,22 +85,52 @@ fn composite(@builtin(global_invocation_id) id: vec3u) {
     var background = air.radiance;
     if ground.enters {
         let p = ground.near * direction;
-        let lit = select(vec3f(0.0), ground_radiance(cos_zenith_at(p, frame.sun_direction)), params.atmosphere.enabled > 0u);
+        var lit = select(vec3f(0.0), ground_radiance(cos_zenith_at(p, frame.sun_direction)), params.atmosphere.enabled > 0u);
+        if GROUND_SHADOW {
+            lit = ground_in_shadow(lit, p);
+        }
         background += air.transmittance * lit;
     } else if params.sun.visible > 0u {
         background += air.transmittance * sun_disc(direction);
     }
+    var opacity = 1.0;
+    if SCENE && scene < NO_SCENE {
+        let bright = scene_radiance(pixel);
+        let altitude = altitude_at(scene * direction);
+        background = through_air(Layer(bright, 0.0, scene), altitude, air).radiance;
+        if frame.scene_lit == 0u {
+            // The caller puts a scene of his own behind: what he adds is dimmed by cloud and air.
+            let white = through_air(Layer(vec3f(1.0), 0.0, scene), altitude, air).radiance;
+            opacity = 1.0 - seen.transmittance * dot(white - background, LUMINANCE);
+        }
+    }
 
     if LAYERS {
         sky[index] = vec4f(background, 1.0);
-        let opacity = 1.0 - seen.transmittance;
-        depth[index] = select(-1.0, seen.distance / opacity, opacity > 0.0);
+        let covered = 1.0 - seen.transmittance;
+        depth[index] = select(-1.0, seen.distance / covered, covered > 0.0);
     }
     if frame.background > 0u {
-        image[index] = vec4f(seen.radiance + seen.transmittance * background, 1.0);
+        image[index] = vec4f(seen.radiance + seen.transmittance * background, opacity);
     } else {
         image[index] = vec4f(seen.radiance, 1.0 - seen.transmittance);
     }
+}
+
+// The ground without the sun that clouds keep from it.
+fn ground_in_shadow(lit: vec3f, p: vec3f) -> vec3f {
+    let mu = cos_zenith_at(p, frame.sun_direction);
+    var sun = 1.0;
+    if !CLOUDLESS {
+        sun = baked_ground_sun(p);
+    }
+    if HIGH {
+        sun *= exp(-high_depth_over(p, mu));
+    }
+    // As in `ground_radiance`.
+    let up = max(mu, 0.0);
+    let direct = params.sun.irradiance * air_transmittance_up(0.0, up) * sun_above_ground(0.0, mu) * up;
+    return max(lit - (1.0 - sun) * params.atmosphere.ground_albedo / PI * direct, vec3f(0.0));
 }
 
 // All the air along a ray, up to the ground or to space.

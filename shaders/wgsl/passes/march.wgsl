@@ -4,6 +4,7 @@
 #import shell
 #import density
 #import light
+#import scene_depth
 
 @compute @workgroup_size(8, 8)
 fn march(@builtin(global_invocation_id) id: vec3u) {
@@ -35,7 +36,7 @@ fn march_cell(index: u32, within: vec2f) -> vec2f {
     let view = view_direction(vec2f(pixel) + 0.5);
     var cloud = Cloud(vec3f(0.0), 1.0, -1.0, NOWHERE);
     if view.w > 0.0 {
-        cloud = march_ray(view.xyz, ray_offset(pixel), within);
+        cloud = march_ray(view.xyz, scene_distance(pixel), ray_offset(pixel), within);
     }
     clouds[index] = vec4f(cloud.radiance, cloud.transmittance);
     cloud_depth[index] = cloud.depth;
@@ -113,8 +114,8 @@ fn step_index(steps: Steps, distance: f32) -> f32 {
     return log2(1.0 + steps.growth * distance) / steps.scale;
 }
 
-fn march_ray(direction: vec3f, offset: f32, within: vec2f) -> Cloud {
-    let stretches = cloud_stretches(direction);
+fn march_ray(direction: vec3f, limit: f32, offset: f32, within: vec2f) -> Cloud {
+    let stretches = stretches_before(cloud_stretches(direction), limit);
     let room = max(quality.view_distance - stretches.start, 0.0);
     let length = min(stretches.first + stretches.second, room);
     // The optical depth is summed, not the transmittance multiplied: a thousand factors of almost 1 are all 1, or all

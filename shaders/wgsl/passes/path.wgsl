@@ -9,6 +9,7 @@
 #import light
 #import random
 #import atmosphere
+#import scene_depth
 
 // Stages of a pixel.
 const START = 0u; // of a path
@@ -44,7 +45,7 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
         if ray.stage == START {
             ray.origin = vec3f(0.0);
             ray.direction = view.xyz;
-            ray.flight = view_flight(view);
+            ray.flight = view_flight(view, scene_distance(pixel));
             ray.x = 0.0;
             ray.throughput = vec3f(1.0);
             ray.light = vec3f(0.0);
@@ -127,8 +128,8 @@ fn draw(ray: ptr<function, PathRay>, pixel: vec2u) -> vec3f {
     return random3(vec3u(pixel.y * frame.width + pixel.x, frame.first_sample + (*ray).done, (*ray).draws), 0u);
 }
 
-fn view_flight(view: vec4f) -> vec4f {
-    let s = cloud_stretches(view.xyz);
+fn view_flight(view: vec4f, limit: f32) -> vec4f {
+    let s = stretches_before(cloud_stretches(view.xyz), limit);
     let room = max(quality.view_distance - s.start, 0.0);
     let clear = view.w == 0.0 || (!VOLUME && !UPPER && params.clouds.coverage <= 0.0);
     let first = min(s.first, room);

@@ -3,7 +3,7 @@
 #import shell
 #import density
 #import panels
-#import high_layer
+#import ground_shadow
 
 // Extinction in 1/m, the field that `march` marches.
 @compute @workgroup_size(64)
@@ -29,25 +29,32 @@ fn sun_transmittance_at_points(@builtin(global_invocation_id) id: vec3u) {
         results[id.x] = vec4f(0.0);
         return;
     }
-    let s = cloud_stretches_from(p, frame.sun_direction);
+    results[id.x] = vec4f(exp(-depth_from(p, frame.sun_direction)), 0.0, 0.0, 0.0);
+}
+
+// Optical depth of all clouds from the eye along directions; -1 where the ground is in the way.
+@compute @workgroup_size(64)
+fn depth_along_directions(@builtin(global_invocation_id) id: vec3u) {
+    if id.x >= frame.width {
+        return;
+    }
+    let direction = points[id.x].xyz;
+    let hidden = hit_ground_from(vec3f(0.0), direction).enters;
+    results[id.x] = vec4f(select(depth_from(vec3f(0.0), direction), -1.0, hidden), 0.0, 0.0, 0.0);
+}
+
+// Optical depth of all clouds on a ray from a point.
+fn depth_from(p: vec3f, direction: vec3f) -> f32 {
+    let s = cloud_stretches_from(p, direction);
     let length = s.first + s.second;
     // At least so long that they suffice.
     let longest = max(2.0 * finest_feature(), length / f32(MAX_SUN_PANELS));
     var depth = 0.0;
     var x = 0.0;
     for (var i = 0u; i < 2u * MAX_SUN_PANELS && x < length; i++) {
-        let panel = panel_from(p, frame.sun_direction, s, x, min(longest, length - x));
-        depth += panel_depth(panel, read_panel(panel, p, frame.sun_direction, s, 0.0).density);
+        let panel = panel_from(p, direction, s, x, min(longest, length - x));
+        depth += panel_depth(panel, read_panel(panel, p, direction, s, 0.0).density);
         x = panel.end;
     }
-    let high = hit_sphere_from(p, frame.sun_direction, params.high_clouds.altitude);
-    if high.hit && params.high_clouds.coverage > 0.0 {
-        for (var side = 0; side < 2; side++) {
-            let t = select(high.far, high.near, side == 0);
-            let q = p + t * frame.sun_direction;
-            let slant = max(abs(cos_zenith_at(q, frame.sun_direction)), 0.02);
-            depth += select(0.0, high_optical_depth(q) / slant, t > 0.0);
-        }
-    }
-    results[id.x] = vec4f(exp(-depth), 0.0, 0.0, 0.0);
+    return depth + high_depth_from(p, direction);
 }

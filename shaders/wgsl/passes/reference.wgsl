@@ -7,6 +7,7 @@
 #import camera
 #import panels
 #import light
+#import scene_depth
 
 // Stages of a ray.
 const START = 0u;
@@ -40,7 +41,7 @@ fn reference(@builtin(global_invocation_id) id: vec3u) {
     let pixel = vec2u(index % frame.width, frame.sheet_row + index / frame.width);
     let view = view_direction(vec2f(pixel) + 0.5);
     let direction = view.xyz;
-    let stretches = cloud_stretches(direction);
+    let stretches = stretches_before(cloud_stretches(direction), scene_distance(pixel));
     let room = max(quality.view_distance - stretches.start, 0.0);
     let length = select(0.0, min(stretches.first + stretches.second, room), view.w > 0.0);
     let empty = length <= 0.0 || (!VOLUME && !UPPER && params.clouds.coverage <= 0.0);

@@ -4,6 +4,7 @@
 // that the finer lattice adds is put on the list of rays, or gets its value here. An invocation has a square of the
 // lattice: the pixel in its middle, and those of its upper and its left edge, which it shares with its neighbours.
 #import bindings
+#import scene_depth
 
 @compute @workgroup_size(8, 8)
 fn refine(@builtin(global_invocation_id) id: vec3u) {
@@ -46,6 +47,7 @@ struct Known {
     value: vec4f, // as `clouds`
     distance: vec2f, // opacity times depth, opacity
     span: vec2f,
+    scene: f32, // m along the ray
 }
 
 fn read(pixel: vec2u) -> Known {
@@ -53,22 +55,28 @@ fn read(pixel: vec2u) -> Known {
     let value = clouds[index];
     let depth = cloud_depth[index];
     let opacity = select(0.0, max(1.0 - value.a, 1e-6), depth >= 0.0);
-    return Known(value, opacity * vec2f(depth, 1.0), cloud_span[index]);
+    return Known(value, opacity * vec2f(depth, 1.0), cloud_span[index], scene_at(pixel));
+}
+
+fn scene_at(pixel: vec2u) -> f32 {
+    return scene_distance(vec2u(pixel.x, frame.sheet_row + pixel.y));
 }
 
 fn mixed(a: Known, b: Known, share: f32) -> Known {
-    return Known(mix(a.value, b.value, share), mix(a.distance, b.distance, share), vec2f(0.0));
+    return Known(mix(a.value, b.value, share), mix(a.distance, b.distance, share), vec2f(0.0), NO_SCENE);
 }
 
-// How the corners of squares look: least and most light, least and most transmittance, and where the clouds are.
+// How the corners of squares look: least and most light, least and most transmittance, where the clouds are, and how
+// near the user's scene.
 struct Looks {
     light: vec2f,
     transmittance: vec2f,
     span: vec2f,
+    scene: f32,
 }
 
 fn looks(k: Known) -> Looks {
-    return Looks(vec2f(max(max(k.value.r, k.value.g), k.value.b)), k.value.aa, k.span);
+    return Looks(vec2f(max(max(k.value.r, k.value.g), k.value.b)), k.value.aa, k.span, k.scene);
 }
 
 fn joined(a: Looks, b: Looks) -> Looks {
@@ -76,12 +84,15 @@ fn joined(a: Looks, b: Looks) -> Looks {
         vec2f(min(a.light.x, b.light.x), max(a.light.y, b.light.y)),
         vec2f(min(a.transmittance.x, b.transmittance.x), max(a.transmittance.y, b.transmittance.y)),
         vec2f(min(a.span.x, b.span.x), max(a.span.y, b.span.y)),
+        min(a.scene, b.scene),
     );
 }
 
 fn settle(pixel: vec2u, around: Looks, between: Known) {
     let index = pixel.y * frame.march_width + pixel.x;
-    cloud_span[index] = around.span;
+    // Rays that the user's scene ends say nothing of what lies behind it: each ray beside it is marched, and all of it.
+    let open = min(around.scene, scene_at(pixel)) >= NO_SCENE;
+    cloud_span[index] = select(vec2f(0.0, 1e30), around.span, open);
     // Light counts by what it is seen against: the brightest corner, or the sky behind it.
     let backdrop = max(max(sky_light[0].r, sky_light[0].g), sky_light[0].b);
     let against = max(around.light.y, around.transmittance.y * backdrop);
@@ -89,7 +100,7 @@ fn settle(pixel: vec2u, around: Looks, between: Known) {
         around.transmittance.y - around.transmittance.x,
         (around.light.y - around.light.x) / max(against, 1e-30),
     );
-    if contrast > quality.contrast {
+    if contrast > quality.contrast || !open {
         active_rays[atomicAdd(&ray_count, 1u)] = index;
     } else {
         let distance = between.distance;

@@ -54,6 +54,7 @@ pub(crate) fn variant(of: Variant, frame: &Frame, layers: bool) -> Variant {
         high_emboss: high && frame.high_emboss > 0,
         high_low_sun: high && frame.high_low_sun > 0,
         cloudless: frame.cloudless > 0,
+        ground_shadow: frame.ground_shadow > 0,
         layers,
         ..of
     }

@@ -14,6 +14,7 @@ pub mod rays;
 pub mod reference;
 pub mod refine;
 pub mod reproject;
+pub mod shadow;
 pub mod sky;
 pub mod sun_volume;
 pub mod volume;
@@ -25,6 +26,7 @@ use crate::frame::Frame;
 use crate::gpu::{Download, Gpu, Interrupt, Timings, texture_bytes};
 use crate::kernel::{Binding, Variant};
 use crate::params::{self, Params, Quality};
+use crate::scene_depth::SceneTextures;
 use crate::schema::{self, Block as _};
 use crate::shader::Linked;
 
@@ -45,6 +47,7 @@ pub(crate) struct Scene<'a> {
     pub uniforms: &'a Uniforms,
     pub variant: Variant,
     pub bindings: Bindings<'a>,
+    pub scene_depth: &'a SceneTextures,
 }
 
 /// The uniform blocks on the GPU.

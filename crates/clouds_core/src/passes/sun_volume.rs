@@ -36,14 +36,14 @@ pub(crate) struct SunVolume {
 }
 
 /// From where and when a picture's volume is baked. It follows from the picture alone, not from those before.
-struct Origin {
-    steps: [i64; 3],
-    place: DVec2,
-    time: f64,
+pub(crate) struct Origin {
+    pub steps: [i64; 3],
+    pub place: DVec2,
+    pub time: f64,
 }
 
 impl Origin {
-    fn new(eye: DVec3, params: &Params, time: f64) -> Self {
+    pub fn new(eye: DVec3, params: &Params, time: f64) -> Self {
         let period = CLOUD_STEP / fastest(params).max(0.1);
         let place = (eye.truncate() / EYE_STEP).round();
         let steps = [place.x as i64, place.y as i64, (time / period).floor() as i64];

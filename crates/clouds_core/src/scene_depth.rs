@@ -1,0 +1,80 @@
+//! The user's scene: how far each pixel's ray goes until it meets it, and its radiance there.
+
+use std::ops::Range;
+
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+use crate::passes::Bindings;
+
+/// Distance of what is not there, m, and texels of a row (as in scene_depth.wgsl).
+const NO_SCENE: f32 = 1e30;
+const ROW: u32 = 2048;
+
+/// A scene among the clouds, pixel by pixel.
+#[derive(Clone, Copy, Debug)]
+pub struct SceneDepth<'a> {
+    /// Metres along the ray of each pixel, infinite where there is nothing.
+    pub distance: &'a [f32],
+    /// Radiance, red, green and blue of each pixel; without it the picture leaves room for it.
+    pub color: Option<&'a [f32]>,
+}
+
+impl SceneDepth<'_> {
+    /// Whether it fits a picture.
+    pub(crate) fn check(&self, [width, height]: [u32; 2]) -> Result<()> {
+        let pixels = width as usize * height as usize;
+        let fits = |name: &str, numbers: &[f32], channels: usize| {
+            // Written so that NaN fails it.
+            let good = numbers.len() == channels * pixels && numbers.iter().all(|v| *v >= 0.0);
+            let allowed = format!("{channels} numbers from 0 for each of {width} x {height} pixels");
+            if good { Ok(()) } else { Err(Error::parameter(name, "an array", allowed)) }
+        };
+        fits("scene_depth", self.distance, 1)?;
+        self.color.map_or(Ok(()), |color| fits("scene_color", color, 3))
+    }
+}
+
+/// A sheet of it on the GPU.
+pub(crate) struct SceneTextures {
+    depth: wgpu::Texture,
+    color: wgpu::Texture,
+    views: [wgpu::TextureView; 2],
+}
+
+impl SceneTextures {
+    /// For sheets of so many pixels; of none where there is no scene, as kernels that ask for none want something bound.
+    pub fn new(gpu: &Gpu, pixels: u64, colored: bool) -> Self {
+        let texture = |label, pixels: u64, format| {
+            let width = if pixels > 0 { ROW } else { 1 };
+            gpu.flat(label, [width, (pixels as u32).div_ceil(ROW).max(1)], format)
+        };
+        let depth = texture("scene_depth", pixels, wgpu::TextureFormat::R32Float);
+        let color = texture("scene_color", if colored { pixels } else { 0 }, wgpu::TextureFormat::Rgba32Float);
+        let views = [&depth, &color].map(|texture| texture.create_view(&wgpu::TextureViewDescriptor::default()));
+        Self { depth, color, views }
+    }
+
+    /// Whether it has room for sheets of so many pixels.
+    pub fn holds(&self, pixels: u64, colored: bool) -> bool {
+        let room = |texture: &wgpu::Texture| u64::from(texture.width()) * u64::from(texture.height());
+        (pixels == 0 || room(&self.depth) >= pixels) && (!colored || room(&self.color) >= pixels)
+    }
+
+    /// Uploads some of its pixels.
+    pub fn upload(&self, gpu: &Gpu, scene: &SceneDepth<'_>, pixels: Range<usize>) {
+        let texels = |texture: &wgpu::Texture| texture.width() as usize * texture.height() as usize;
+        let mut distance: Vec<f32> = scene.distance[pixels.clone()].iter().map(|v| v.min(NO_SCENE)).collect();
+        distance.resize(texels(&self.depth), NO_SCENE);
+        gpu.write_texture(&self.depth, &distance);
+        if let Some(color) = scene.color {
+            let rgb = &color[3 * pixels.start..3 * pixels.end];
+            let mut rgba: Vec<[f32; 4]> = rgb.chunks_exact(3).map(|c| [c[0], c[1], c[2], 1.0]).collect();
+            rgba.resize(texels(&self.color), [0.0; 4]);
+            gpu.write_texture(&self.color, &rgba);
+        }
+    }
+
+    pub fn bindings(&self) -> Bindings<'_> {
+        vec![("scene_depth", (&self.views[0]).into()), ("scene_color", (&self.views[1]).into())]
+    }
+}

@@ -1,0 +1,113 @@
+"""A user's scene among the clouds: what `scene_depth` and `scene_color` may be."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from nubis._errors import ParameterError
+from nubis._nubis import Camera
+
+Array = npt.NDArray[np.float32]
+
+
+class Scene(NamedTuple):
+    """A checked scene: metres along each ray, radiance and cover where they are known."""
+
+    depth: Array
+    color: Array | None  # (H, W, 3), of what is there, not dimmed by its cover
+    cover: Array | None  # (H, W), None where all of it is 1
+
+
+def checked(depth: Any, color: Any, size: tuple[int, int]) -> Scene | None:
+    """The scene of a picture of `size` (width, height), None for none."""
+    if depth is None:
+        if color is not None:
+            raise ParameterError("scene_color is not allowed without scene_depth")
+        return None
+    width, height = size
+    depth = _numbers("scene_depth", depth, [(height, width)], finite=False)
+    if color is None:
+        return None if np.isinf(depth).all() else Scene(depth, None, None)
+    color = _numbers("scene_color", color, [(height, width, 3), (height, width, 4)], finite=True)
+    if np.isinf(depth).all():
+        return None
+    if color.shape[2] == 3:
+        return Scene(depth, color, None)
+    cover = color[..., 3]
+    if (cover > 1).any():
+        raise _refused("scene_color[..., 3]", cover, cover > 1, "from 0 to 1")
+    # What covers nothing is not there; what is, is as bright as it is however little it covers.
+    depth = np.where(cover > 0, depth, np.float32(np.inf))
+    whole = np.ascontiguousarray(color[..., :3] / np.where(cover > 0, cover, 1)[..., None])
+    there = np.isfinite(depth)
+    if not there.any():
+        return None
+    return Scene(depth, whole, None if (cover[there] == 1).all() else cover)
+
+
+def _numbers(name: str, value: Any, shapes: list[tuple[int, ...]], *, finite: bool) -> Array:
+    allowed = "an array of numbers of shape " + " or ".join(map(str, shapes))
+    try:
+        array = np.asarray(value)
+    except Exception:  # whatever a class of its own raises
+        raise ParameterError(f"{name} is not allowed: it must be {allowed}") from None
+    if array.dtype.kind not in "fiu" or array.shape not in shapes:
+        raise ParameterError(
+            f"{name} = array of shape {array.shape} and dtype {array.dtype} is not allowed: "
+            f"it must be {allowed}"
+        )
+    with np.errstate(over="ignore"):
+        numbers = np.ascontiguousarray(array, dtype=np.float32)
+    bad = ~(numbers >= 0) | (np.isinf(numbers) if finite else False)
+    if bad.any():
+        raise _refused(name, array, bad, "finite and not negative" if finite else "0 m to infinity")
+    return numbers
+
+
+def _refused(name: str, array: Any, bad: Any, allowed: str) -> ParameterError:
+    at = tuple(int(i) for i in np.argwhere(bad)[0])
+    return ParameterError(
+        f"{name}[{', '.join(map(str, at))}] = {array[at]} is not allowed: it must be {allowed}"
+    )
+
+
+def distance_from_z(camera: Camera, z: npt.ArrayLike) -> Array:
+    """Return the distance along each pixel's ray for the z of a rasterizer.
+
+    A depth buffer, once made linear, holds z: metres along the axis of the camera. `scene_depth`
+    is metres along the ray, which in a corner of the picture is more.
+
+    Parameters
+    ----------
+    camera : Camera
+        A pinhole (`Camera.look_at`, `Camera.from_matrix`), of the picture that `z` has.
+    z : array-like, shape (height, width)
+        Metres in front of the eye, inf where there is nothing.
+
+    Returns
+    -------
+    distance : array of float32, shape (height, width)
+
+    Raises
+    ------
+    ParameterError
+        For a camera without such a z, or an array that is not of two axes.
+    """
+    if not isinstance(camera, Camera) or camera.kind != "perspective":
+        raise ParameterError(f"camera = {camera!r} is not allowed: it must be a pinhole camera")
+    array = np.asarray(z)
+    if array.ndim != 2 or 0 in array.shape:
+        raise ParameterError(
+            f"z = array of shape {array.shape} is not allowed: it must be (height, width)"
+        )
+    array = _numbers("z", array, [array.shape], finite=False)
+    height, width = array.shape
+    tan = math.tan(math.radians(camera.fov) / 2)
+    x = (2 * (np.arange(width) + 0.5) / width - 1) * tan * width / height
+    y = (1 - 2 * (np.arange(height) + 0.5) / height) * tan
+    distance: Array = (array * np.sqrt(1 + x**2 + y[:, None] ** 2)).astype(np.float32)
+    return distance

@@ -1,0 +1,37 @@
+// The user's scene: how far each pixel's ray goes until it meets it, and what it looks like from there.
+#import bindings
+#import shell
+
+// Distance of what is not there, m (as in scene_depth.rs).
+const NO_SCENE = 1e30;
+// Texels of a row (as in scene_depth.rs): pictures are wider than textures may be.
+const SCENE_ROW = 2048u;
+
+// How far the ray of a pixel goes, m.
+fn scene_distance(pixel: vec2u) -> f32 {
+    if !SCENE {
+        return NO_SCENE;
+    }
+    return textureLoad(scene_depth, scene_texel(pixel), 0).r;
+}
+
+// Radiance of the scene at a pixel, none where it is not known.
+fn scene_radiance(pixel: vec2u) -> vec3f {
+    let lit = frame.scene_lit > 0u;
+    return select(vec3f(0.0), textureLoad(scene_color, select(vec2u(0u), scene_texel(pixel), lit), 0).rgb, lit);
+}
+
+fn scene_texel(pixel: vec2u) -> vec2u {
+    let index = (pixel.y - frame.sheet_row) * frame.width + pixel.x;
+    return vec2u(index % SCENE_ROW, index / SCENE_ROW);
+}
+
+// The part of a ray's stretches that lies in front of a distance along it.
+fn stretches_before(s: Stretches, distance: f32) -> Stretches {
+    if !SCENE {
+        return s;
+    }
+    let first = clamp(distance - s.start, 0.0, s.first);
+    let second = clamp(distance - s.start - s.first - s.gap, 0.0, s.second);
+    return Stretches(s.start, first, s.gap, second);
+}

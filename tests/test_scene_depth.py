@@ -1,0 +1,270 @@
+"""A user's scene among the clouds: `scene_depth` and `scene_color`."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import nubis
+import twin
+
+SIZE = 32, 18
+INF = np.float32(np.inf)
+# From below, through a field whose features are hundreds of metres.
+CAMERA = nubis.Camera.look_at((0, 0, 200), (0, 3000, 2200), (0, 0, 1), 20.0)
+
+
+def single(**changes):
+    return twin.smooth_params(**{"light.model": "single", "light.g": 0.3} | changes)
+
+
+def mountain():
+    """Metres along each ray: a slope that runs from before the clouds to far behind them, its
+    summit a jump from near to nothing.
+    """
+    y, x = np.mgrid[: SIZE[1], : SIZE[0]]
+    depth = 900.0 * np.exp2(x / 6.0) + 20.0 * y
+    return np.where((x + y) % 11 == 0, np.inf, depth).astype(np.float32)
+
+
+def cut_twin(monkeypatch, depth, function, *args):
+    """A twin whose rays end at the scene."""
+    ends = twin.ray_ends
+
+    def cut(eye, directions, params):
+        return np.minimum(ends(eye, directions, params), depth.ravel())
+
+    monkeypatch.setattr(twin, "ray_ends", cut)
+    return function(*args)
+
+
+@pytest.mark.parametrize("method", ["march", "reference"])
+def test_mountain_in_the_clouds(renderer, monkeypatch, method):
+    """In front of, inside and behind cloud, against float64 rays that end at the same depth: single
+    scattering and transmittance, 1 % RMS.
+    """
+    params, depth = single(), mountain()
+    quality = twin.fine(400, 40) if method == "march" else "reference"
+    ours = nubis.Renderer(*SIZE, quality=quality)
+    time = twin.cloudy_time(ours, params, CAMERA, 0.2, 0.7)
+    layers = ours.render_layers(CAMERA, params, time=time, scene_depth=depth)
+    directions = twin.pixel_directions(CAMERA, *SIZE).reshape(-1, 3)
+    eye = np.array(CAMERA.eye)
+    seen = cut_twin(
+        monkeypatch, depth, twin.transmittance, ours, params, eye, directions, 800, time
+    ).reshape(depth.shape)
+    whole = ours.render_layers(CAMERA, params, time=time)["transmittance"]
+    # The mountain is in front of cloud, behind cloud, and within it.
+    front, behind = (seen > 0.999) & (whole < 0.5), (seen < 0.5) & (seen < whole + 0.01)
+    assert front.sum() > 20 and behind.sum() > 20
+    assert ((seen < 0.9) & (seen > whole + 0.1)).sum() > 20
+    assert np.abs(layers["transmittance"] - seen).max() < 0.01
+    light = twin.single_scattering(ours, params, eye, directions, 300, 100, time)
+    assert twin.relative_rmse(layers["radiance"].reshape(-1, 3), light) < 0.01
+
+
+def test_path_tracing_ends_at_the_scene(monkeypatch):
+    """Its transmittance is a share of 256 paths: within five standard errors everywhere."""
+    params, depth = single(**{"light.model": "path"}), mountain()
+    quality = nubis.quality("balanced").replace(path_samples=256, path_scatterings=1)
+    ours = nubis.Renderer(*SIZE, quality=quality)
+    time = twin.cloudy_time(ours, params, CAMERA, 0.2, 0.7)
+    layers = ours.render_layers(CAMERA, params, time=time, scene_depth=depth)
+    directions = twin.pixel_directions(CAMERA, *SIZE).reshape(-1, 3)
+    seen = cut_twin(
+        monkeypatch, depth, twin.transmittance, ours, params, CAMERA.eye, directions, 800, time
+    ).reshape(depth.shape)
+    error = np.sqrt(seen * (1 - seen) / 256) + 0.002
+    assert (np.abs(layers["transmittance"] - seen) < 5 * error).all()
+
+
+@pytest.mark.parametrize("scene", ["fair_weather", "above"])
+@pytest.mark.parametrize("contrast", [0.0, 0.2])
+def test_nothing_there_changes_nothing(scene, contrast):
+    """Where the scene is infinitely far the picture is the same to the bit: everywhere, and beside
+    a scene; between rays of a lattice, as far as the scene does not reach.
+    """
+    camera, params = nubis.scenes[scene]
+    size = 320, 180
+    quality = nubis.quality("draft").replace(contrast=contrast)
+    ours = nubis.Renderer(*size, quality=quality)
+    plain = ours.render(camera, params)
+    depth = np.full(size[::-1], np.inf)
+    assert np.array_equal(ours.render(camera, params, scene_depth=depth), plain)
+    depth[:, :80] = 500.0
+    frame = ours.render(camera, params, scene_depth=depth)
+    first = 80 if contrast == 0 else 84
+    assert np.array_equal(frame[:, first:], plain[:, first:])
+    assert not np.array_equal(frame[:, :80], plain[:, :80])
+    assert np.array_equal(ours.render(camera, params), plain)
+
+
+def test_lattices_do_not_reach_across_the_scene():
+    """With rays between rays of a lattice, edges of the scene are as if every ray were marched."""
+    camera, params = nubis.scenes["fair_weather"]
+    size = 320, 180
+    y, x = np.mgrid[: size[1], : size[0]]
+    depth = np.where((x // 5 + y // 7) % 3 == 0, 1500.0, np.where(x % 31 == 3, 6000.0, np.inf))
+    every, lattice = (
+        nubis.Renderer(*size, quality=nubis.quality("draft").replace(contrast=c)).render_layers(
+            camera, params, scene_depth=depth
+        )
+        for c in (0.0, 0.2)
+    )
+    beside = np.isfinite(depth)
+    for layer in ("radiance", "transmittance"):
+        assert np.array_equal(every[layer][beside], lattice[layer][beside])
+    # Beside it rays look everywhere, not only where the scene let their neighbours see cloud.
+    assert np.abs(every["transmittance"] - lattice["transmittance"]).mean() < 0.01
+
+
+def test_scene_colour_in_clear_air():
+    """Without air and in front of all clouds the scene is what it is, whatever its background."""
+    params = single()
+    ours = nubis.Renderer(*SIZE, quality="draft")
+    rng = np.random.default_rng(3)
+    color = rng.uniform(0, 5, (SIZE[1], SIZE[0], 3)).astype(np.float32)
+    depth = np.full(SIZE[::-1], 100.0)
+    frame = ours.render(CAMERA, params, scene_depth=depth, scene_color=color)
+    assert np.allclose(frame[..., :3], color, rtol=1e-6) and (frame[..., 3] == 1).all()
+    alone = ours.render(CAMERA, params, scene_depth=depth)
+    assert np.allclose(alone, 0, atol=1e-6)
+
+
+def test_colour_behind_cloud_and_air():
+    """The scene is dimmed by what lies before it: picture = layers over air and scene, and without
+    its colour the caller composites the same, to what one alpha for three colours can do.
+    """
+    camera, params = nubis.scenes["fair_weather"]
+    ours = nubis.Renderer(64, 36, quality="draft")
+    depth = np.full((36, 64), 15_000.0)
+    layers = ours.render_layers(camera, params, scene_depth=depth)
+    black = ours.render(camera, params, scene_depth=depth, scene_color=np.zeros((36, 64, 3)))
+    mixed = layers["radiance"] + layers["transmittance"][..., None] * layers["sky"]
+    assert np.allclose(black[..., :3], mixed, rtol=1e-5, atol=1e-6)
+    grey = ours.render(camera, params, scene_depth=depth, scene_color=np.ones((36, 64, 3)))
+    room = ours.render(camera, params, scene_depth=depth)
+    assert np.allclose(room[..., :3], black[..., :3], rtol=1e-5, atol=1e-6)
+    luminance = (grey - black)[..., :3] @ np.array([0.2126, 0.7152, 0.0722])
+    assert np.allclose(1 - room[..., 3], luminance, atol=1e-3)
+    # 15 km of air let more red through than blue.
+    added = (grey - black)[layers["transmittance"] > 0.9]
+    assert (added[:, 0] > 1.05 * added[:, 2]).all() and (added[:, :3] < 1).all()
+
+
+def test_air_before_the_scene_is_a_part_of_all_air():
+    """From nothing at the eye to all of it, ever more."""
+    camera, params = nubis.scenes["fair_weather"]
+    params = params.with_(**{"clouds.coverage": 0.0, "high_clouds.coverage": 0.0})
+    ours = nubis.Renderer(16, 9, quality="draft")
+    seen = [
+        ours.render(
+            camera, params, scene_depth=np.full((9, 16), d), scene_color=np.zeros((9, 16, 3))
+        )
+        for d in (0.0, 1e3, 1e4, 1e5)
+    ]
+    assert (seen[0][..., :3] < 1e-6).all()
+    assert all((a[..., :3] <= b[..., :3]).all() for a, b in pairwise(seen))
+    above = np.s_[:3]  # the rows that see no ground
+    sky = ours.render(camera, params)
+    assert (seen[3][above][..., :3] <= 1.001 * sky[above][..., :3]).all()
+
+
+def test_partial_cover_is_a_mixture():
+    """A pixel covered in part is so much of the covered picture and the rest of the open one."""
+    camera, params = nubis.scenes["fair_weather"]
+    ours = nubis.Renderer(64, 36, quality=nubis.quality("draft").replace(contrast=0.0))
+    rng = np.random.default_rng(5)
+    cover = rng.uniform(0, 1, (36, 64)) * (rng.uniform(size=(36, 64)) < 0.8)
+    cover[rng.uniform(size=(36, 64)) < 0.2] = 1.0
+    depth = np.full((36, 64), 4000.0)
+    color = np.concatenate(
+        [np.full((36, 64, 3), 0.7) * cover[..., None], cover[..., None]], axis=-1
+    )
+    frame = ours.render(camera, params, scene_depth=depth, scene_color=color)
+    full = ours.render(camera, params, scene_depth=depth, scene_color=np.full((36, 64, 3), 0.7))
+    none = ours.render(camera, params)
+    expected = cover[..., None] * full + (1 - cover[..., None]) * none
+    assert np.allclose(frame, expected, rtol=1e-4, atol=1e-5)
+
+
+def test_high_clouds_and_sun_are_behind_it():
+    """A scene below the high clouds hides them, and the sun's disc."""
+    params = nubis.Params().with_(
+        **{"clouds.coverage": 0.0, "high_clouds.coverage": 1.0, "high_clouds.optical_depth": 3.0}
+    )
+    toward = 1000.0 * twin.sun_direction(params)
+    camera = nubis.Camera.look_at((0, 0, 100), np.add((0, 0, 100), toward), (0, 0, 1), 4.0)
+    ours = nubis.Renderer(*SIZE, quality="draft")
+    open_sky = ours.render_layers(camera, params)
+    assert open_sky["transmittance"].max() < 0.5 and open_sky["sky"].max() > 1e3
+    hidden = ours.render_layers(camera, params, scene_depth=np.full(SIZE[::-1], 5000.0))
+    assert (hidden["transmittance"] == 1).all() and hidden["sky"].max() < 10
+    past = ours.render_layers(camera, params, scene_depth=np.full(SIZE[::-1], 50_000.0))
+    assert np.array_equal(past["transmittance"], open_sky["transmittance"])
+
+
+def test_sheets_read_their_own_rows():
+    """A picture of several sheets: the scene of each row is its own."""
+    params = nubis.Params().with_(**{"clouds.coverage": 0.0, "high_clouds.coverage": 0.0})
+    size = 2048, 700  # sheets of a million pixels
+    ours = nubis.Renderer(*size, quality="draft")
+    color = np.zeros((size[1], size[0], 3), dtype=np.float32)
+    color[...] = np.arange(size[1])[:, None, None] + np.arange(size[0])[:, None] / 4096
+    frame = ours.render(
+        CAMERA,
+        params.with_(**{"atmosphere.enabled": False}),
+        scene_depth=np.full(size[::-1], 10.0),
+        scene_color=color,
+    )
+    assert np.allclose(frame[..., :3], color, rtol=1e-6)
+
+
+def test_distance_from_z():
+    """A plane across the axis is z away everywhere, and farther along rays to the corners."""
+    z = np.full((36, 64), 1000.0)
+    z[3, 5] = np.inf
+    distance = nubis.distance_from_z(CAMERA, z)
+    directions = twin.pixel_directions(CAMERA, 64, 36)
+    along = distance * (directions @ np.array(CAMERA.forward))
+    assert np.allclose(along[np.isfinite(z)], 1000.0, rtol=1e-6) and np.isinf(distance[3, 5])
+    with pytest.raises(nubis.ParameterError, match="pinhole"):
+        nubis.distance_from_z(nubis.Camera.equirect((0, 0, 0)), z)
+    with pytest.raises(nubis.ParameterError, match=r"z\[0, 1\] = -1"):
+        nubis.distance_from_z(CAMERA, [[1.0, -1.0]])
+    with pytest.raises(nubis.ParameterError, match="shape"):
+        nubis.distance_from_z(CAMERA, 5.0)
+
+
+@pytest.mark.parametrize(
+    "depth, color, message",
+    [
+        (np.zeros((36, 64)), None, "scene_depth = array of shape"),
+        (np.zeros(SIZE), None, "scene_depth = array of shape"),
+        (np.zeros(SIZE[::-1], dtype=bool), None, "dtype bool"),
+        (np.zeros(SIZE[::-1], dtype=complex), None, "dtype complex"),
+        ("far", None, "scene_depth"),
+        (np.full(SIZE[::-1], np.nan), None, r"scene_depth\[0, 0\] = nan"),
+        (np.full(SIZE[::-1], -1.0), None, r"scene_depth\[0, 0\] = -1"),
+        (None, np.zeros((*SIZE[::-1], 3)), "without scene_depth"),
+        (np.ones(SIZE[::-1]), np.zeros((*SIZE[::-1], 2)), "scene_color = array of shape"),
+        (np.ones(SIZE[::-1]), np.full((*SIZE[::-1], 3), np.inf), r"scene_color\[0, 0, 0\] = inf"),
+        (np.ones(SIZE[::-1]), np.full((*SIZE[::-1], 3), -0.5), r"scene_color\[0, 0, 0\] = -0.5"),
+        (
+            np.ones(SIZE[::-1]),
+            np.full((*SIZE[::-1], 4), 1.5),
+            r"scene_color\[..., 3\]\[0, 0\] = 1.5",
+        ),
+    ],
+)
+def test_what_is_no_scene(renderer, depth, color, message):
+    with pytest.raises(nubis.ParameterError, match=message):
+        renderer(*SIZE).render(CAMERA, nubis.Params(), scene_depth=depth, scene_color=color)
+
+
+def test_colour_needs_the_sky(renderer):
+    depth, color = np.ones(SIZE[::-1]), np.ones((*SIZE[::-1], 3))
+    with pytest.raises(nubis.ParameterError, match="background"):
+        renderer(*SIZE).render(
+            CAMERA, nubis.Params(), background=None, scene_depth=depth, scene_color=color
+        )

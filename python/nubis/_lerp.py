@@ -12,7 +12,7 @@ from nubis import _nubis
 from nubis._block import Block
 from nubis._errors import ParameterError
 from nubis._weather import layers, mixture
-from nubis.params import Params
+from nubis.params import Params, UpperClouds
 
 
 def lerp(a: Params, b: Params, t: float) -> Params:
@@ -57,13 +57,19 @@ def lerp(a: Params, b: Params, t: float) -> Params:
         old_layers = [(weather, (1 - share) * weight) for weather, weight in layers(a)]
         new_layers = [(weather, share * weight) for weather, weight in layers(b)]
         values["weather"], values["weather_mix"] = mixture(old_layers + new_layers)
-    deck = values["upper_clouds"]
-    lowest = values["clouds"].top
-    if deck.coverage > 0 and deck.base < lowest:
-        # Where the other sky has no deck, its clouds may stand higher: the deck comes from above.
-        top = min(deck.top + lowest - deck.base, 25_000.0)
-        values["upper_clouds"] = deck.replace(base=min(lowest, top - 1.0), top=top)
+    values["upper_clouds"] = _above(values["upper_clouds"], values["clouds"].top)
     return Params(**values)
+
+
+def _above(deck: UpperClouds, lowest: float) -> UpperClouds:
+    """The deck above the clouds: where the other sky has none, those may stand higher than it does,
+    and it comes from above.
+    """
+    if deck.coverage == 0 or deck.base >= lowest:
+        return deck
+    top = min(deck.top + lowest - deck.base, 25_000.0)
+    room = np.float32(top) > np.float32(lowest)
+    return deck.replace(base=lowest, top=top) if room else deck.replace(coverage=0.0)
 
 
 def _block(a: Block, b: Block, t: float) -> Block:

@@ -62,7 +62,9 @@ def lerp(a: Params, b: Params, t: float) -> Params:
     if deck.coverage > 0 and deck.base < lowest:
         # Where the other sky has no deck, its clouds may stand higher: the deck comes from above.
         top = min(deck.top + lowest - deck.base, 25_000.0)
-        values["upper_clouds"] = deck.replace(base=min(lowest, top - 1.0), top=top)
+        # Under the highest top of all, there is no room for one.
+        room = {} if lowest <= top - 1.0 else {"coverage": 0.0}
+        values["upper_clouds"] = deck.replace(base=min(lowest, top - 1.0), top=top, **room)
     return Params(**values)
 
 

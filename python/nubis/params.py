@@ -360,8 +360,9 @@ class Light(Block):
     phase : {henyey_greenstein, droplet, mie}
         The phase function: `henyey_greenstein` of `g` (in thesis2018 and vsu2022 of `g_back`, too)
         as published; `droplet` a fit of real droplets, whose clouds have a silver lining (Jendersie
-        and d'Eon 2023); `mie` the droplets themselves, with fogbow and glory. Allowed: one of
-        "henyey_greenstein", "droplet", "mie".
+        and d'Eon 2023); `mie` the droplets themselves, with fogbow and glory. Half of what those
+        scatter goes on within a few degrees: `path` then takes many times the samples. Allowed: one
+        of "henyey_greenstein", "droplet", "mie".
     droplet_diameter : float
         Diameter of the droplets (`droplet`, `mie`): fog 5 to 20, cumulus 10 to 30, drizzle 50.
         Allowed: a number from 5 to 50 µm.

@@ -273,7 +273,8 @@ params! {
         model: Model = Model::Thesis2018;
         /// The phase function: `henyey_greenstein` of `g` (in thesis2018 and vsu2022 of `g_back`, too) as published;
         /// `droplet` a fit of real droplets, whose clouds have a silver lining (Jendersie and d'Eon 2023); `mie` the droplets
-        /// themselves, with fogbow and glory.
+        /// themselves, with fogbow and glory. Half of what those scatter goes on within a few degrees: `path` then takes many
+        /// times the samples.
         phase: Phase = Phase::HenyeyGreenstein;
         /// Diameter of the droplets (`droplet`, `mie`): fog 5 to 20, cumulus 10 to 30, drizzle 50.
         droplet_diameter: f32 = 20.0, in 5..=50 "µm";

@@ -9,10 +9,10 @@
 const POINTS = 4u;
 // Samples toward the sun for each doubling of the distance, and most of them. They read cells as long as they are, or by so
 // many halvings shorter. Storms cast shadows over tens of kilometres: there, more and shorter ones take the mean error of the
-// transmittance in the scene `storm` from 0.11 to 0.05.
-override DENSE_SAMPLES: f32 = select(4.0, 6.0, RAINY);
-override MOST_SAMPLES: f32 = select(50.0, 70.0, RAINY);
-override SHORTER: f32 = select(0.5, 1.0, RAINY);
+// transmittance in the scene `storm` from 0.11 to 0.04.
+override DENSE_SAMPLES: f32 = select(4.0, 8.0, RAINY);
+override MOST_SAMPLES: f32 = select(50.0, 90.0, RAINY);
+override SHORTER: f32 = select(0.5, 1.5, RAINY);
 
 @compute @workgroup_size(8, 8)
 fn sun_volume_density(@builtin(global_invocation_id) id: vec3u) {

@@ -92,8 +92,8 @@ scene_depth = distance.min(axis=(1, 3))
 renderer = nubis.Renderer(WIDTH, HEIGHT, quality="draft")
 there = cover > 0
 points = EYE + scene_depth[there][:, None] * rays(1)[there.ravel()]
-slope_y, slope_x = np.gradient(table, extent / len(table))
-dx, dy = (looked_up(slope, extent, points[:, 0], points[:, 1]) for slope in (slope_x, slope_y))
+slopes = np.asarray(np.gradient(table, extent / len(table)))
+dy, dx = (looked_up(slope, extent, points[:, 0], points[:, 1]) for slope in slopes)
 normal = np.stack([-dx, -dy, np.ones_like(dx)], axis=-1)
 normal /= np.linalg.norm(normal, axis=1, keepdims=True)
 elevation, azimuth = np.radians([params.sun.elevation, params.sun.azimuth])

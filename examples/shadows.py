@@ -16,7 +16,7 @@ Path("out").mkdir(exist_ok=True)
 
 shadow = renderer.shadow_map(params, extent=20_000.0, size=256)
 light = shadow.transmittance
-nubis.save("out/shadow_map.png", np.repeat((255 * light).astype(np.uint8)[..., None], 3, axis=2))
+nubis.save("out/shadow_map.png", np.repeat(light[..., None], 3, axis=2), tonemap="none")
 print(f"{light.mean():.0%} of the sun reaches the ground")
 
 # Which texel has the shadow of a point of a cloud?

@@ -182,6 +182,7 @@ def test_high_clouds_cast_shadows(renderer):
     full_shadow = seen_ground(DOWN, params, **full)
     expected = full_shadow + sun * (open_ground - full_shadow)
     assert twin.relative_rmse(seen_ground(DOWN, params), expected) < 0.01
+    assert twin.relative_rmse(open_ground, expected) > 0.1
 
 
 def test_shadows_of_a_grid():

@@ -97,7 +97,8 @@ impl Method {
         let high = high.then(|| ("high_clouds", high_clouds::kernel(&params.high_clouds)));
         let bakes = high.into_iter().chain(BAKES).map(|(pass, entry)| (pass, entry, Variant::bake()));
         let composite = ("composite", "composite", composite::variant(variant, frame, layers));
-        bakes.chain(clouds.iter().map(with(variant))).chain([composite]).collect()
+        let clouds = clouds.iter().map(with(variant));
+        bakes.chain(shadow::kernels(frame, variant)).chain(clouds).chain([composite]).collect()
     }
 
     /// Whether there is nothing to march.

@@ -25,7 +25,7 @@ fn shadow_map(@builtin(global_invocation_id) id: vec3u) {
     let p = vec3f(at, 0.0);
     let hidden = hit_ground_from(p, frame.sun_direction).enters;
     let fine = select(2.0 * finest_feature(), frame.voxel, VOLUME);
-    let depth = cloud_depth_to_sun(p, fine, MAP_STEPS, 0.0) + high_depth_from(p, frame.sun_direction);
+    let depth = cloud_depth_to_sun(p, fine, MAP_STEPS) + high_depth_from(p, frame.sun_direction);
     shadow_out[texel.y * frame.width + id.x] = select(exp(-depth), 0.0, hidden);
 }
 
@@ -38,11 +38,11 @@ fn shadow_ground(@builtin(global_invocation_id) id: vec3u) {
     let texel = shadow_texel(level);
     let at = (vec2f(vec2u(id.x, id.y % SHADOW_SIDE)) + 0.5 - 0.5 * f32(SHADOW_SIDE)) * texel;
     let fine = select(max(2.0 * finest_feature(), texel), max(frame.voxel, 0.5 * texel), VOLUME);
-    let depth = cloud_depth_to_sun(ground_place(at), fine, GROUND_STEPS, 0.5 * texel);
+    let depth = cloud_depth_to_sun(ground_place(at), fine, GROUND_STEPS);
     textureStore(map_out, id.xy, vec4f(exp(-depth)));
 }
 
-// Lets each level go over into the next in the outer third of its reach, and the last into its mean.
+// Lets each level go over into the next in the outer fifth of its reach, and the last into its mean.
 @compute @workgroup_size(8, 8)
 fn shadow_blend(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= SHADOW_SIDE || id.y >= SHADOW_SIDE * SHADOW_LEVELS {
@@ -53,7 +53,7 @@ fn shadow_blend(@builtin(global_invocation_id) id: vec3u) {
     let q = (vec2f(vec2u(id.x, id.y % SHADOW_SIDE)) + 0.5 - 0.5 * f32(SHADOW_SIDE)) * shadow_texel(level);
     let mean = textureLoad(ground_shadow_mean, vec2u(0u), 0).r;
     let beyond = select(shadow_in_level(q, min(level + 1u, SHADOW_LEVELS - 1u)), mean, last);
-    let edge = smoothstep(0.67, 1.0, max(abs(q.x), abs(q.y)) / shadow_reach(level));
+    let edge = smoothstep(0.8, 1.0, max(abs(q.x), abs(q.y)) / shadow_reach(level));
     textureStore(map_out, id.xy, vec4f(mix(textureLoad(ground_shadow, id.xy, 0).r, beyond, edge)));
 }
 
@@ -76,14 +76,13 @@ fn shadow_mean(@builtin(local_invocation_id) id: vec3u) {
     }
 }
 
-// Optical depth of the marched clouds from a point to the sun, in steps of `fine` metres, or longer ones. Detail smaller than
-// `width` is left out, and all of it where that is more than the finest step.
-fn cloud_depth_to_sun(p: vec3f, fine: f32, most: f32, width: f32) -> f32 {
+// Optical depth of the marched clouds from a point to the sun, in steps of `fine` metres, or longer ones. Each reads the finest
+// noise: coarser levels of detail make clouds smaller, and the ground of `fair_weather` 3 % too bright in the mean, not 1 %.
+fn cloud_depth_to_sun(p: vec3f, fine: f32, most: f32) -> f32 {
     let s = cloud_stretches_from(p, frame.sun_direction);
     let length = s.first + s.second;
     let count = clamp(ceil(length / fine), FEWEST, most);
     let step = length / count;
-    let wide = max(width, 0.3 * step);
     var depth = 0.0;
     var i = 0.0;
     // A loop in a loop, as in passes/march: where the weather alone says that there is nothing, nothing else is read.
@@ -97,7 +96,7 @@ fn cloud_depth_to_sun(p: vec3f, fine: f32, most: f32, width: f32) -> f32 {
                 break;
             }
         }
-        depth += frame.extinction * step * cloud_density(column, cloud_shape(column, wide), wide);
+        depth += frame.extinction * step * cloud_density(column, cloud_shape(column, 0.0), 0.0);
         if i >= count || depth > DARK {
             break;
         }

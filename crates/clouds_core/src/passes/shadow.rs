@@ -11,6 +11,7 @@ use crate::camera::Camera;
 use crate::error::Result;
 use crate::frame::Frame;
 use crate::gpu::Gpu;
+use crate::kernel::{Variant, Wanted};
 use crate::params::{self, Params};
 use crate::wind::Carried;
 
@@ -60,6 +61,24 @@ pub(crate) fn texel(altitude: f32) -> f32 {
     TEXEL * (altitude / TEXEL_ALTITUDE).max(1.0).log2().floor().exp2()
 }
 
+/// The kernels of the bake.
+const BAKES: [&str; 3] = ["shadow_ground", "shadow_mean", "shadow_blend"];
+
+/// What they are made for: no camera, and no scene in sight.
+fn bake_variant(of: Variant) -> Variant {
+    Variant { camera: 0, scene: false, ..of }
+}
+
+/// Whether a picture bakes them.
+fn wanted(frame: &Frame) -> bool {
+    frame.ground_shadow > 0 && frame.cloudless == 0
+}
+
+/// The kernels that a picture asks for.
+pub(crate) fn kernels(frame: &Frame, of: Variant) -> impl Iterator<Item = Wanted> {
+    BAKES.into_iter().filter(|_| wanted(frame)).map(move |entry| ("shadow", entry, bake_variant(of)))
+}
+
 impl GroundShadow {
     pub const fn new() -> Self {
         Self { made: Baked::new() }
@@ -74,7 +93,7 @@ impl GroundShadow {
         (eye, time): (DVec3, f64),
         world: &Bindings<'_>,
     ) -> Result<Bindings<'_>> {
-        let wanted = frame.ground_shadow > 0 && frame.cloudless == 0;
+        let wanted = wanted(frame);
         let origin = origin(eye, params, time);
         let sun = [params.sun.elevation, params.sun.azimuth];
         let clouds = (params.clouds.clone(), params.upper_clouds.clone());
@@ -96,7 +115,7 @@ impl GroundShadow {
                 let mut work = ctx.gpu.work();
                 let mut bake = |entry, ours: &Bindings<'_>, size| {
                     let bindings = [world.as_slice(), ours].concat();
-                    work.dispatch(&*ctx.gpu.kernel("shadow", entry, ctx.variant)?, &bindings, size)
+                    work.dispatch(&*ctx.gpu.kernel("shadow", entry, bake_variant(ctx.variant))?, &bindings, size)
                 };
                 let made = ("ground_shadow", (&single).into());
                 bake("shadow_ground", &vec![("map_out", (&single).into())], size)?;

@@ -19,6 +19,7 @@ use crate::passes::broad_weather::BroadWeather;
 use crate::passes::composite::Composed;
 use crate::passes::high_clouds::{self, HighClouds};
 use crate::passes::majorant::Majorants;
+use crate::passes::multiscatter::Multiscatter;
 use crate::passes::march::Marched;
 use crate::passes::noise::Noise;
 use crate::passes::profile::Profile;
@@ -27,6 +28,7 @@ use crate::passes::refine::{COARSEST, Refined};
 use crate::passes::reproject::{ORDER, STRIDE};
 use crate::passes::sky::Sky;
 use crate::passes::sun_volume::SunVolume;
+use crate::passes::transmittance::Transmittance;
 use crate::passes::volume::Volume;
 use crate::passes::weather::Weather;
 use crate::passes::{Bindings, Context, Scene, Uniforms, composite, march, path, points, reference, refine, reproject};
@@ -76,7 +78,12 @@ enum Method {
 }
 
 /// The kernels of the bakes that are kept from no earlier process.
-const BAKES: [(&str, &str); 2] = [("sky", "sky_map_bake"), ("sky", "sky_light_bake")];
+const BAKES: [(&str, &str); 4] = [
+    ("transmittance", "transmittance_bake"),
+    ("sky", "sky_map_bake"),
+    ("sky", "air_share_bake"),
+    ("sky", "sky_light_bake"),
+];
 
 impl Method {
     /// The kernels of a still.
@@ -581,6 +588,8 @@ struct World {
     broad_weather: BroadWeather,
     profile: Profile,
     high_clouds: HighClouds,
+    transmittance: Transmittance,
+    multiscatter: Multiscatter,
     sky: Sky,
     volume: Volume,
     majorants: Majorants,
@@ -603,6 +612,8 @@ impl World {
             broad_weather: BroadWeather::new(),
             profile: Profile::new(),
             high_clouds: HighClouds::new(),
+            transmittance: Transmittance::new(),
+            multiscatter: Multiscatter::new(),
             sky: Sky::new(),
             volume: Volume::new(),
             majorants: Majorants::new(),
@@ -632,7 +643,10 @@ impl World {
         let broad_weather = self.broad_weather.run(&mut ctx, params)?; // when the larger map or its shares change
         let profile = self.profile.run(&ctx, params)?; // once for a table
         let high_clouds = self.high_clouds.run(&mut ctx, params, frame)?; // as they evolve
-        let sky = self.sky.run(&mut ctx, params, frame, at.0)?; // when sun or air change, or the eye has gone far
+        let mut air = self.transmittance.run(&mut ctx, params)?; // when the air changes
+        let multiscatter = self.multiscatter.run(&mut ctx, params, &air)?; // when the air or the ground change
+        air.extend(multiscatter);
+        let sky = self.sky.run(&mut ctx, params, frame, at.0, &air)?; // when sun or air change, or the eye has gone far
 
         ctx.variant = variant; // those so far know no picture
         let volume = self.volume.run(&ctx, params)?; // once for a grid
@@ -640,7 +654,7 @@ impl World {
         let blue_noise = vec![("blue_noise", (&self.blue_noise).into())];
         let uniforms = self.uniforms.bindings();
         let mut bindings: Bindings<'_> =
-            [uniforms, noise.bindings(), weather, broad_weather, profile, high_clouds, sky, volume, blue_noise]
+            [uniforms, noise.bindings(), weather, broad_weather, profile, high_clouds, air, sky, volume, blue_noise]
                 .concat();
         let majorants = self.majorants.run(&mut ctx, params, &bindings)?; // when paths are traced
         bindings.extend(majorants);

@@ -33,10 +33,6 @@ fn air_extinction(parts: vec3f) -> vec3f {
     return RAYLEIGH * parts.x + MIE_EXTINCTION * parts.y + OZONE * parts.z;
 }
 
-fn air_scattering(parts: vec3f) -> vec3f {
-    return RAYLEIGH * parts.x + MIE_SCATTERING * parts.y;
-}
-
 // What the air scatters of light whose direction turns by an angle, given as 1 minus its cosine.
 fn air_scattering_toward(parts: vec3f, one_minus_mu: f32) -> vec3f {
     let mu = 1.0 - one_minus_mu;
@@ -103,8 +99,11 @@ fn sun_irradiance(h: f32, mu: f32) -> vec3f {
 
 // Tables by altitude and the sun's cosine with the zenith, one below the other, for a sun of irradiance 1.
 const SCATTERED = 0u; // mean radiance of the light that has been scattered, or reflected by the ground, once or more
-const FROM_ABOVE = 1u; // its irradiance on a level plane from above, over pi
-const FROM_BELOW = 2u; // the same from below
+const SCATTERED_UP = 1u; // of that the mean of radiance times the squared cosine with the vertical
+const SCATTERED_SUNWARD = 2u; // the same with the horizontal toward the sun
+const FROM_ABOVE = 3u; // its irradiance on a level plane from above, over pi
+const FROM_BELOW = 4u; // the same from below
+const TABLES = 5u;
 // Texels of a table: the cosine from nadir to zenith, altitude.
 const TABLE_COSINES = 64u;
 const TABLE_ALTITUDES = 24u;
@@ -129,15 +128,35 @@ fn table_coordinates(table: u32, h: f32, mu: f32) -> vec2f {
     let up = sqrt(saturate(h / AIR_TOP)) + f32(table) * f32(TABLE_ALTITUDES) / f32(TABLE_ALTITUDES - 1u);
     let column = across * f32(TABLE_COSINES - 1u) + 0.5;
     let row = up * f32(TABLE_ALTITUDES - 1u) + 0.5;
-    return vec2f(column / f32(TABLE_COSINES), row / f32(3u * TABLE_ALTITUDES));
+    return vec2f(column / f32(TABLE_COSINES), row / f32(TABLES * TABLE_ALTITUDES));
 }
 
 fn air_light_at(table: u32, h: f32, mu: f32) -> vec3f {
     return from_table(textureSampleLevel(air_light, clamp_sampler, table_coordinates(table, h, mu), 0.0).rgb);
 }
 
-fn air_scattered(h: f32, mu: f32) -> vec3f {
-    return air_light_at(SCATTERED, h, mu);
+// Light that has been scattered before.
+struct Scattered {
+    mean: vec3f,
+    up: vec3f,
+    sunward: vec3f,
+}
+
+// What the air sends of it, per metre, in a direction with zenith cosine `mu` and cosine `cosine` with the sun. Rayleigh's
+// phase function, a square, asks of a field of light for no more than its second moments: those across the vertical and
+// the sun's plane follow, and the mixed one is left out. Of aerosol, of which there is little, the mean is enough.
+fn scattered_again(parts: vec3f, light: Scattered, mu_sun: f32, mu: f32, cosine: f32) -> vec3f {
+    let sine_sun = max(1.0 - mu_sun * mu_sun, 0.0);
+    let level = max(1.0 - mu * mu, 0.0);
+    let toward = cosine - mu * mu_sun;
+    let sunward = select(0.5 * level, min(toward * toward / max(sine_sun, 1e-6), level), sine_sun > 1e-4);
+    let beside = max(light.mean - light.up - light.sunward, vec3f(0.0));
+    let moment = mu * mu * light.up + sunward * light.sunward + (level - sunward) * beside;
+    return RAYLEIGH * parts.x * 0.75 * (light.mean + moment) + MIE_SCATTERING * parts.y * light.mean;
+}
+
+fn air_scattered(h: f32, mu: f32) -> Scattered {
+    return Scattered(air_light_at(SCATTERED, h, mu), air_light_at(SCATTERED_UP, h, mu), air_light_at(SCATTERED_SUNWARD, h, mu));
 }
 
 fn sky_from_above(h: f32, mu: f32) -> vec3f {

@@ -1,6 +1,6 @@
-// Bakes the light that the air and the ground have scattered, order by order. The first keeps its phase functions; those
-// after it are scattered evenly, and as they then depend on altitude and sun alone, each is gathered exactly from the
-// table of the one before. Hillaire 2020 takes the second to stand for all that follow, which at dusk, when low air is lit
+// Bakes the light that the air and the ground have scattered, order by order. The first keeps its phase functions; of
+// those after it the mean and two moments are kept, which depend on altitude and sun alone, so that each is gathered from
+// the tables of the one before. Hillaire 2020 takes the second to stand for all that follow, which at dusk, when low air is lit
 // by high air alone, it does not.
 #import bindings
 #import atmosphere
@@ -12,9 +12,11 @@ const ROWS_BELOW = 5u;
 const COLUMNS = 6u;
 const STEPS = 16u;
 
-// What arrives at a point: as `SCATTERED`, `FROM_ABOVE` and `FROM_BELOW`.
+// What arrives at a point: as the tables.
 struct Arriving {
-    scattered: vec3f,
+    mean: vec3f,
+    up: vec3f,
+    sunward: vec3f,
     above: vec3f,
     below: vec3f,
 }
@@ -36,7 +38,9 @@ fn write_order(id: vec3u, first: bool) {
     let at = vec2f(id.xy) / vec2f(f32(TABLE_COSINES - 1u), f32(TABLE_ALTITUDES - 1u));
     let side = 2.0 * at.x - 1.0;
     let arriving = gather_light(AIR_TOP * at.y * at.y, sign(side) * side * side, first);
-    write_table(id.xy, SCATTERED, arriving.scattered);
+    write_table(id.xy, SCATTERED, arriving.mean);
+    write_table(id.xy, SCATTERED_UP, arriving.up);
+    write_table(id.xy, SCATTERED_SUNWARD, arriving.sunward);
     write_table(id.xy, FROM_ABOVE, arriving.above);
     write_table(id.xy, FROM_BELOW, arriving.below);
 }
@@ -48,7 +52,7 @@ fn write_table(at: vec2u, table: u32, light: vec3f) {
 fn gather_light(h: f32, mu_sun: f32, first: bool) -> Arriving {
     let radius = params.atmosphere.planet_radius;
     let dip = atan2(sqrt(h * (2.0 * radius + h)), radius);
-    var sum = Arriving(vec3f(0.0), vec3f(0.0), vec3f(0.0));
+    var sum = Arriving(vec3f(0.0), vec3f(0.0), vec3f(0.0), vec3f(0.0), vec3f(0.0));
     var cosines = vec2f(0.0);
     for (var row = 0u; row < ROWS_ABOVE + ROWS_BELOW; row++) {
         // By squares from the horizon, where light changes fastest with the angle.
@@ -62,7 +66,10 @@ fn gather_light(h: f32, mu_sun: f32, first: bool) -> Arriving {
             let azimuth = PI * (f32(column) + 0.5) / f32(COLUMNS);
             let cosine = clamp(up * mu_sun + cos(angle.y) * cos(azimuth) * sqrt(max(1.0 - mu_sun * mu_sun, 0.0)), -1.0, 1.0);
             let light = light_along(h, mu_sun, up, cosine, is_above, first);
-            sum.scattered += share * light;
+            let sunward = cos(angle.y) * cos(azimuth);
+            sum.mean += share * light;
+            sum.up += share * up * up * light;
+            sum.sunward += share * sunward * sunward * light;
             sum.above += share * max(up, 0.0) * light;
             sum.below += share * max(-up, 0.0) * light;
             cosines += share * vec2f(max(up, 0.0), max(-up, 0.0));
@@ -101,7 +108,12 @@ fn light_along(h: f32, mu_sun: f32, mu: f32, cosine: f32, is_above: bool, first:
         if first {
             source = air_scattering_toward(parts, 1.0 - cosine) * sunlight(altitude, mu_there);
         } else {
-            source = air_scattering(parts) * order_before(SCATTERED, altitude, mu_there);
+            let light = Scattered(
+                order_before(SCATTERED, altitude, mu_there),
+                order_before(SCATTERED_UP, altitude, mu_there),
+                order_before(SCATTERED_SUNWARD, altitude, mu_there),
+            );
+            source = scattered_again(parts, light, mu_there, (b + t.y) / (radius + altitude), cosine);
         }
         let x = air_extinction(parts) * step;
         radiance += exp(-depth) * source * step * one_minus_exp_over3(x);
@@ -136,6 +148,6 @@ fn sum_orders(@builtin(global_invocation_id) id: vec3u) {
     let rest = fourth / (1.0 - min(fourth / third, vec3f(0.95)));
     var sum = from_table(textureLoad(mix_a, id.xy, 0).rgb) + from_table(textureLoad(mix_b, id.xy, 0).rgb) + third + rest;
     let table = id.y / TABLE_ALTITUDES;
-    sum += select(NIGHT * select(params.atmosphere.ground_albedo, vec3f(1.0), table == FROM_ABOVE), vec3f(0.0), table == SCATTERED);
+    sum += select(NIGHT * select(params.atmosphere.ground_albedo, vec3f(1.0), table == FROM_ABOVE), vec3f(0.0), table < FROM_ABOVE);
     textureStore(map_out, id.xy, vec4f(to_table(sum), 1.0));
 }

@@ -72,8 +72,10 @@ fn air_step(before: AirLight, direction: vec3f, t: f32, step: f32) -> AirLight {
     let h = altitude_at(p);
     let mu_sun = cos_zenith_at(p, frame.sun_direction);
     let parts = air_parts(h);
-    let once = air_scattering_toward(parts, one_minus_cos(direction, frame.sun_direction)) * sunlight(h, mu_sun);
-    let source = once + air_scattering(parts) * air_scattered(h, mu_sun);
+    let one_minus_cosine = one_minus_cos(direction, frame.sun_direction);
+    let once = air_scattering_toward(parts, one_minus_cosine) * sunlight(h, mu_sun);
+    let again = scattered_again(parts, air_scattered(h, mu_sun), mu_sun, cos_zenith_at(p, direction), 1.0 - one_minus_cosine);
+    let source = once + again;
     let x = air_extinction(parts) * step;
     let radiance = before.radiance + exp(-before.depth) * source * step * one_minus_exp_over3(x);
     return AirLight(radiance, before.depth + x);

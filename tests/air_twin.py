@@ -17,7 +17,7 @@ FILE = Path(__file__).parent / "references" / "sky.json"
 EARTH, TOP = 6_371_000.0, 100_000.0
 RAYLEIGH = np.array([5.802e-6, 13.558e-6, 33.1e-6])
 MIE_SCATTERING, MIE_EXTINCTION, MIE_G = 3.996e-6, 4.440e-6, 0.8
-OZONE = np.array([0.650e-6, 1.881e-6, 0.085e-6])
+OZONE = np.array([1.881e-6, 1.881e-6, 0.085e-6])
 
 
 class Air:
@@ -183,7 +183,7 @@ AZIMUTHS = [10.0, 150.0]
 
 def main():
     rng = np.random.default_rng(1)
-    paths = int(sys.argv[1]) if len(sys.argv) > 1 else 3000
+    paths = int(sys.argv[1]) if len(sys.argv) > 1 else 1500
     air = [Air(channel) for channel in range(3)]
     cases = []
     for sun in SUNS:

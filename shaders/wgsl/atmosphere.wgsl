@@ -12,8 +12,10 @@ const MIE_SCATTERING = 3.996e-6;
 const MIE_EXTINCTION = 4.440e-6;
 const MIE_HEIGHT = 1200.0;
 const MIE_G = 0.8;
-// Ozone absorbs most at its middle, 1/m, and falls to none along a triangle so wide to either side, m.
-const OZONE = vec3f(0.650e-6, 1.881e-6, 0.085e-6);
+// Ozone absorbs most at its middle, 1/m, and falls to none along a triangle so wide to either side, m. Red is not the
+// table's 0.650e-6, of 680 nm: at the 610 nm that Rec. 709 means, near the top of Chappuis' band, ozone absorbs as much as
+// at 550 or more, without which dusk is purple and no hour is blue.
+const OZONE = vec3f(1.881e-6, 1.881e-6, 0.085e-6);
 const OZONE_ALTITUDE = 25000.0;
 const OZONE_WIDTH = 15000.0;
 // Altitude where the air ends, m (as in frame.rs).

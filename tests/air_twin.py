@@ -73,8 +73,10 @@ class Air:
         seen = np.clip((mu - horizon + 0.005) / 0.01, 0, 1)
         return np.exp(-depth) * seen * seen * (3 - 2 * seen)
 
-    def trace(self, rng, eye_height, direction, sun, paths, orders=16, steps=64):
-        """Mean radiance of paths along a direction, and its standard error, for irradiance 1."""
+    def trace(self, rng, eye_height, direction, sun, paths, orders=16, steps=64, limit=np.inf):
+        """Mean radiance of paths along a direction, and its standard error, for irradiance 1; of
+        the air before a distance `limit` alone.
+        """
         position = np.tile([0.0, 0.0, self.radius + eye_height], (paths, 1))
         direction = np.tile(direction, (paths, 1)).astype(float)
         weight, radiance = np.ones(paths), np.zeros(paths)
@@ -88,6 +90,8 @@ class Air:
             near = np.maximum(-np.sqrt(np.maximum(up, 0)) - b, 0)
             far = np.where(grounded, -np.sqrt(np.maximum(down, 0)) - b, far)
             far = np.where(up > 0, np.maximum(far, near), near)
+            grounded &= far <= limit
+            far, limit = np.minimum(far, limit), np.inf
             lowest = np.clip(-b, near, far)
             s0, s1 = -np.sqrt(lowest - near), np.sqrt(far - lowest)
             s = s0[:, None] + (s1 - s0)[:, None] * np.linspace(0, 1, steps + 1)

@@ -8,8 +8,9 @@
 
 // 1 - g of droplets (Hansen 1971): forward scattering is as good as none.
 const DIFFUSED = 0.15;
-// Optical depth, after that, outside of which diffuse light is as good as unscattered: Milne's 0.71.
-const SKIN = 0.71;
+// Optical depth, after that, of the skin in which light is as much from outside as from inside: with it a thick cloud lets
+// through 1 / (3/4 depth), as two streams do.
+const SKIN = 1.333;
 // Mean density of a cloud where the coverage is 1, as a share of the largest: baked noise, profile and detail together.
 const FILLING = 0.3;
 

@@ -14,6 +14,16 @@ const SKIN = 1.333;
 // Mean density of a cloud where the coverage is 1, as a share of the largest: baked noise, profile and detail together.
 const FILLING = 0.3;
 
+// Share of the clear sky's light on the ground that the clouds leave: all beside them, under them what gets through.
+fn ground_share() -> f32 {
+    if VOLUME {
+        return 1.0;
+    }
+    let thick = DIFFUSED * FILLING * params.clouds.extinction * (params.clouds.top - params.clouds.base);
+    let cover = params.clouds.coverage * params.clouds.coverage * (3.0 - 2.0 * params.clouds.coverage);
+    return 1.0 - params.light.ambient_occlusion * cover * (1.0 - 1.0 / (1.0 + 0.75 * thick));
+}
+
 // Share of the ambient light at a point that comes from above; the rest comes from below.
 fn ambient_share(column: Column) -> f32 {
     let thick = DIFFUSED * FILLING * column.coverage * frame.extinction * column.thickness;

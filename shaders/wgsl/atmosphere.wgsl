@@ -105,7 +105,8 @@ const SCATTERED_UP = 1u; // of that the mean of radiance times the squared cosin
 const SCATTERED_SUNWARD = 2u; // the same with the horizontal toward the sun
 const FROM_ABOVE = 3u; // its irradiance on a level plane from above, over pi
 const FROM_BELOW = 4u; // the same from below
-const TABLES = 5u;
+const FLUX_SUNWARD = 5u; // the mean of radiance times the cosine with the horizontal toward the sun
+const TABLES = 6u;
 // Texels of a table: the cosine from nadir to zenith, altitude.
 const TABLE_COSINES = 64u;
 const TABLE_ALTITUDES = 24u;
@@ -142,11 +143,13 @@ struct Scattered {
     mean: vec3f,
     up: vec3f,
     sunward: vec3f,
+    flux_up: vec3f,
+    flux_sunward: vec3f,
 }
 
 // What the air sends of it, per metre, in a direction with zenith cosine `mu` and cosine `cosine` with the sun. Rayleigh's
 // phase function, a square, asks of a field of light for no more than its second moments: those across the vertical and
-// the sun's plane follow, and the mixed one is left out. Of aerosol, of which there is little, the mean is enough.
+// the sun's plane follow, and the mixed one is left out. That of aerosol is cut after them (1, g, g^2 of its series).
 fn scattered_again(parts: vec3f, light: Scattered, mu_sun: f32, mu: f32, cosine: f32) -> vec3f {
     let sine_sun = max(1.0 - mu_sun * mu_sun, 0.0);
     let level = max(1.0 - mu * mu, 0.0);
@@ -154,11 +157,19 @@ fn scattered_again(parts: vec3f, light: Scattered, mu_sun: f32, mu: f32, cosine:
     let sunward = select(0.5 * level, min(toward * toward / max(sine_sun, 1e-6), level), sine_sun > 1e-4);
     let beside = max(light.mean - light.up - light.sunward, vec3f(0.0));
     let moment = mu * mu * light.up + sunward * light.sunward + (level - sunward) * beside;
-    return RAYLEIGH * parts.x * 0.75 * (light.mean + moment) + MIE_SCATTERING * parts.y * light.mean;
+    let flux = mu * light.flux_up + sign(toward) * sqrt(sunward) * light.flux_sunward;
+    let aerosol = light.mean + 3.0 * MIE_G * flux + 2.5 * MIE_G * MIE_G * (3.0 * moment - light.mean);
+    return RAYLEIGH * parts.x * 0.75 * (light.mean + moment) + MIE_SCATTERING * parts.y * max(aerosol, vec3f(0.0));
 }
 
 fn air_scattered(h: f32, mu: f32) -> Scattered {
-    return Scattered(air_light_at(SCATTERED, h, mu), air_light_at(SCATTERED_UP, h, mu), air_light_at(SCATTERED_SUNWARD, h, mu));
+    return Scattered(
+        air_light_at(SCATTERED, h, mu),
+        air_light_at(SCATTERED_UP, h, mu),
+        air_light_at(SCATTERED_SUNWARD, h, mu),
+        0.25 * (sky_from_above(h, mu) - sky_from_below(h, mu)),
+        air_light_at(FLUX_SUNWARD, h, mu),
+    );
 }
 
 fn sky_from_above(h: f32, mu: f32) -> vec3f {

@@ -236,6 +236,7 @@ fn radiance_through_air(sum: Gathered, nodes: Nodes, direction: vec3f) -> vec3f 
     let way = air_way(direction);
     let texel = air_share_texel(direction);
     let sky = sky_radiance(direction);
+    let lit_ground = ground_share() * params.sun.irradiance;
     var radiance = vec3f(0.0);
     var depth = vec3f(0.0);
     var before = min(way.start, nodes.start);
@@ -250,7 +251,7 @@ fn radiance_through_air(sum: Gathered, nodes: Nodes, direction: vec3f) -> vec3f 
         var light = sum.sun[k] * sun_irradiance(h, mu);
         if MODEL != MODEL_SINGLE {
             light += sum.above[k] * ambient_above(params.sun.irradiance * sky_from_above(h, mu));
-            light += (sum.weight[k] - sum.above[k]) * ambient_below(params.sun.irradiance * sky_from_below(h, mu));
+            light += (sum.weight[k] - sum.above[k]) * ambient_below(lit_ground * sky_from_below(h, mu));
         }
         radiance += air.transmittance * light + sum.weight[k] * air.radiance;
     }

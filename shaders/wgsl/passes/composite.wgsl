@@ -182,7 +182,9 @@ fn high_layer(direction: vec3f, distance: f32, visible: bool) -> Layer {
     if MODEL != MODEL_SINGLE {
         // Overcast is grey: from below, only what it lets through comes from above.
         let through = select(1.0, 1.0 / (1.0 + HIGH_ALBEDO * optical_depth), cosine > 0.0);
-        radiance += mix(ambient_below(sky_light_uniform[1].rgb), ambient_above(sky_light_uniform[0].rgb), through);
+        // The ground has what they and those under them let through.
+        let ground = ground_share() * mix(1.0, 1.0 / (1.0 + HIGH_ALBEDO * optical_depth), params.high_clouds.coverage);
+        radiance += mix(ambient_below(ground * sky_light_uniform[1].rgb), ambient_above(sky_light_uniform[0].rgb), through);
     }
     return Layer((1.0 - transmittance) * radiance, transmittance, distance);
 }

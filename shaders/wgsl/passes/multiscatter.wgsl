@@ -17,6 +17,7 @@ struct Arriving {
     mean: vec3f,
     up: vec3f,
     sunward: vec3f,
+    flux_sunward: vec3f,
     above: vec3f,
     below: vec3f,
 }
@@ -41,6 +42,7 @@ fn write_order(id: vec3u, first: bool) {
     write_table(id.xy, SCATTERED, arriving.mean);
     write_table(id.xy, SCATTERED_UP, arriving.up);
     write_table(id.xy, SCATTERED_SUNWARD, arriving.sunward);
+    write_table(id.xy, FLUX_SUNWARD, arriving.flux_sunward);
     write_table(id.xy, FROM_ABOVE, arriving.above);
     write_table(id.xy, FROM_BELOW, arriving.below);
 }
@@ -52,7 +54,7 @@ fn write_table(at: vec2u, table: u32, light: vec3f) {
 fn gather_light(h: f32, mu_sun: f32, first: bool) -> Arriving {
     let radius = params.atmosphere.planet_radius;
     let dip = atan2(sqrt(h * (2.0 * radius + h)), radius);
-    var sum = Arriving(vec3f(0.0), vec3f(0.0), vec3f(0.0), vec3f(0.0), vec3f(0.0));
+    var sum = Arriving(vec3f(0.0), vec3f(0.0), vec3f(0.0), vec3f(0.0), vec3f(0.0), vec3f(0.0));
     var cosines = vec2f(0.0);
     for (var row = 0u; row < ROWS_ABOVE + ROWS_BELOW; row++) {
         // By squares from the horizon, where light changes fastest with the angle.
@@ -70,6 +72,7 @@ fn gather_light(h: f32, mu_sun: f32, first: bool) -> Arriving {
             sum.mean += share * light;
             sum.up += share * up * up * light;
             sum.sunward += share * sunward * sunward * light;
+            sum.flux_sunward += share * sunward * light;
             sum.above += share * max(up, 0.0) * light;
             sum.below += share * max(-up, 0.0) * light;
             cosines += share * vec2f(max(up, 0.0), max(-up, 0.0));
@@ -112,6 +115,8 @@ fn light_along(h: f32, mu_sun: f32, mu: f32, cosine: f32, is_above: bool, first:
                 order_before(SCATTERED, altitude, mu_there),
                 order_before(SCATTERED_UP, altitude, mu_there),
                 order_before(SCATTERED_SUNWARD, altitude, mu_there),
+                0.25 * (order_before(FROM_ABOVE, altitude, mu_there) - order_before(FROM_BELOW, altitude, mu_there)),
+                order_before(FLUX_SUNWARD, altitude, mu_there),
             );
             source = scattered_again(parts, light, mu_there, (b + t.y) / (radius + altitude), cosine);
         }
@@ -148,6 +153,6 @@ fn sum_orders(@builtin(global_invocation_id) id: vec3u) {
     let rest = fourth / (1.0 - min(fourth / third, vec3f(0.95)));
     var sum = from_table(textureLoad(mix_a, id.xy, 0).rgb) + from_table(textureLoad(mix_b, id.xy, 0).rgb) + third + rest;
     let table = id.y / TABLE_ALTITUDES;
-    sum += select(NIGHT * select(params.atmosphere.ground_albedo, vec3f(1.0), table == FROM_ABOVE), vec3f(0.0), table < FROM_ABOVE);
+    sum += select(NIGHT * select(params.atmosphere.ground_albedo, vec3f(1.0), table == FROM_ABOVE), vec3f(0.0), table != FROM_ABOVE && table != FROM_BELOW);
     textureStore(map_out, id.xy, vec4f(to_table(sum), 1.0));
 }

@@ -4,8 +4,8 @@ use super::{Baked, Bindings, Context, kept, transmittance};
 use crate::error::Result;
 use crate::params::{self, Params};
 
-/// Texels: cosine of the sun's angle with the zenith, altitude in each of five tables (as in atmosphere.wgsl).
-const SIZE: [u32; 3] = [64, 5 * 24, 1];
+/// Texels: cosine of the sun's angle with the zenith, altitude in each of six tables (as in atmosphere.wgsl).
+const SIZE: [u32; 3] = [64, 6 * 24, 1];
 /// Orders of scattering; the last stands for all that follow (as in passes/multiscatter.wgsl).
 const ORDERS: usize = 4;
 
@@ -41,7 +41,7 @@ fn bake(ctx: &mut Context<'_>, sum: &wgpu::Texture, air: &Bindings<'_>) -> Resul
         let bindings = [ctx.uniforms.bindings().as_slice(), air, ours].concat();
         work.dispatch(&*ctx.gpu.kernel("multiscatter", entry, ctx.variant)?, &bindings, size)
     };
-    let table = [SIZE[0], SIZE[1] / 5, 1];
+    let table = [SIZE[0], SIZE[1] / 6, 1];
     // The first has none before it, but one kernel body with the others: what is bound is not read.
     dispatch("first_order", table, &[("mix_a", (&orders[1]).into()), ("map_out", (&orders[0]).into())])?;
     for (before, next) in orders.iter().zip(&orders[1..]) {

@@ -1,7 +1,7 @@
 """Radiance of clear air in float64, by tracing paths through every order of scattering.
 
-Nothing is shared with the shaders but the numbers of the air (Hillaire 2020, table 1). Paths keep the
-phase functions at every order; each of their straight pieces is integrated for the sun's light by
+Nothing is shared with the shaders but the numbers of the air (Hillaire 2020, table 1). Paths keep
+the phase functions at every order; each straight piece is integrated for the light of the sun by
 quadrature, so that what little light there is at dusk is found too.
 
     python tests/air_twin.py    # writes references/sky.json
@@ -9,6 +9,7 @@ quadrature, so that what little light there is at dusk is found too.
 
 import json
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -50,7 +51,7 @@ class Air:
         depth = np.zeros_like(mu)
         # Dense around the lowest point, which for these rays is their start.
         edges = np.linspace(0, 1, 9) ** 2
-        for a, b in zip(edges[:-1], edges[1:], strict=True):
+        for a, b in pairwise(edges):
             for node, weight in zip(nodes, weights, strict=True):
                 s = length * (a + (b - a) * (node + 1) / 2)
                 at = np.sqrt(r * r + s * s + 2 * r * s * mu) - self.radius
@@ -196,13 +197,20 @@ def main():
             for view in views:
                 for azimuth in AZIMUTHS:
                     got = [
-                        a.trace(rng, eye, direction_of(view, azimuth), direction_of(sun, 0.0), count)
+                        a.trace(
+                            rng, eye, direction_of(view, azimuth), direction_of(sun, 0.0), count
+                        )
                         for a in air
                     ]
                     cases.append(
-                        {"sun": sun, "eye": eye, "view": view, "azimuth": azimuth,
-                         "radiance": [float(f"{m:.5g}") for m, _ in got],
-                         "error": [float(f"{e:.2g}") for _, e in got]}
+                        {
+                            "sun": sun,
+                            "eye": eye,
+                            "view": view,
+                            "azimuth": azimuth,
+                            "radiance": [float(f"{m:.5g}") for m, _ in got],
+                            "error": [float(f"{e:.2g}") for _, e in got],
+                        }
                     )
         print(sun, cases[-1], flush=True)
     FILE.write_text("[\n" + ",\n".join(json.dumps(case) for case in cases) + "\n]\n")

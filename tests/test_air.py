@@ -3,10 +3,10 @@
 import json
 from itertools import pairwise
 
-import air_twin
 import numpy as np
 import pytest
 
+import air_twin
 import nubis
 from nubis import DensityGrid
 from nubis.testing import probe
@@ -66,7 +66,9 @@ def test_transmittance_to_space():
     above = np.array([0.05, 0.5, 2, 10, 45, 90])
     h, elevation = np.repeat(h, 6), (above - np.minimum(dip, 89)[:, None] * (above < 45)).ravel()
     mu = np.sin(np.radians(elevation))
-    got = probe("vec4f(air_transmittance(x.x, x.y), 1.0)", np.stack([h, mu], 1), imports=["atmosphere"])
+    got = probe(
+        "vec4f(air_transmittance(x.x, x.y), 1.0)", np.stack([h, mu], 1), imports=["atmosphere"]
+    )
     for channel in range(3):
         air = air_twin.Air(channel)
         r = air_twin.EARTH + h[:, None]
@@ -89,7 +91,9 @@ def test_a_clear_sky_is_shaped_as_cie_says(renderer):
     def relative(direction):
         angle = np.arccos(np.clip(direction @ sun, -1, 1))
         gradation = 1 + a * np.exp(b / max(direction[2], 1e-3))
-        return gradation * (1 + c * (np.exp(d * angle) - np.exp(d * np.pi / 2)) + e * np.cos(angle) ** 2)
+        return gradation * (
+            1 + c * (np.exp(d * angle) - np.exp(d * np.pi / 2)) + e * np.cos(angle) ** 2
+        )
 
     zenith = np.array([0.0, 0.0, 1.0])
     ours, cie = [], []
@@ -115,7 +119,9 @@ def test_skylight_on_the_ground():
     level, angle = np.sqrt(u), 2 * np.pi * v
     up = np.sqrt(1 - u)
     directions = np.stack([level * np.cos(angle), level * np.sin(angle), up], 1)
-    radiance = probe("vec4f(sky_radiance(x.xyz), 1.0)", directions, imports=["atmosphere"], params=params)
+    radiance = probe(
+        "vec4f(sky_radiance(x.xyz), 1.0)", directions, imports=["atmosphere"], params=params
+    )
     np.testing.assert_allclose(table[0, :3], radiance[:, :3].mean(axis=0), rtol=0.03)
     assert 0.05 < np.pi * table[0, :3] @ LUMINANCE < 0.15
 
@@ -133,7 +139,9 @@ def test_night_falls(renderer):
     # At -18 degrees what is left of the sun's is of the night's order.
     assert light[3] < 10 * light[-1]
     bright = clear(**{"sun.elevation": -90.0, "sun.irradiance": (1e6,) * 3})
-    np.testing.assert_allclose(sky(renderer, bright, zenith) @ LUMINANCE, 1e6 * light[-1], rtol=1e-3)
+    np.testing.assert_allclose(
+        sky(renderer, bright, zenith) @ LUMINANCE, 1e6 * light[-1], rtol=1e-3
+    )
 
 
 def test_tables_are_made_when_their_inputs_change():
@@ -247,9 +255,9 @@ def test_the_air_before_a_cloud(place):
     grid = slabs(place)
     seen = make.render_layers(camera, among_slabs(grid))
     dark = make.render_layers(camera, among_slabs(grid, **{"light.albedo": 0.0}))
-    bare = make.render_layers(
-        camera, among_slabs(grid, **{"atmosphere.aerial_perspective": 0.0})
-    )["radiance"][0, 0]
+    bare = make.render_layers(camera, among_slabs(grid, **{"atmosphere.aerial_perspective": 0.0}))[
+        "radiance"
+    ][0, 0]
     assert seen["transmittance"][0, 0] < 0.01
     distance = float(seen["depth"][0, 0])
     own = (seen["radiance"] - dark["radiance"])[0, 0] / bare
@@ -286,14 +294,18 @@ def test_each_cloud_has_its_own_air():
 
 
 def test_the_sun_sets_later_above():
-    """Under a sun at -1.5 degrees a slab is in the planet's shadow at 500 m, and lit, red, at 8 km."""
+    """Under a sun at -1.5 degrees a slab is in the planet's shadow at 500 m, at 8 km it is red."""
     data = np.zeros((9, 2, 2), dtype=np.float32)
     data[0], data[8] = 0.05, 0.05
     grid = DensityGrid(data, ((-9000, 3000, 0), (9000, 4000, 9000)))
     make = nubis.Renderer(1, 1)
     changes = {"sun.elevation": -1.5, "sun.azimuth": 180.0, "atmosphere.aerial_perspective": 0.0}
-    low = make.render(looking((0.0, 1.0, 0.0), 300.0), among_slabs(grid, **changes), background=None)
-    high = make.render(looking((0.0, 1.0, 0.0), 8700.0), among_slabs(grid, **changes), background=None)
+    low = make.render(
+        looking((0.0, 1.0, 0.0), 300.0), among_slabs(grid, **changes), background=None
+    )
+    high = make.render(
+        looking((0.0, 1.0, 0.0), 8700.0), among_slabs(grid, **changes), background=None
+    )
     assert low[0, 0, 3] > 0.9 and high[0, 0, 3] > 0.9
     assert (low[0, 0, :3] == 0).all()
     mu = np.sin(np.radians(-1.5))

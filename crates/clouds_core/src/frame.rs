@@ -283,7 +283,8 @@ impl Frame {
     /// Whether the sun can reach the clouds: false only where `sky_light` is none (passes/sky.wgsl, atmosphere.wgsl).
     pub fn sunlit(&self, params: &Params) -> bool {
         if params.atmosphere.enabled {
-            let top = params.volume.as_ref().map_or(f64::from(self.shell_top), |volume| highest(params, volume.bounds()));
+            let top =
+                params.volume.as_ref().map_or(f64::from(self.shell_top), |volume| highest(params, volume.bounds()));
             return self.sun_above(params, top);
         }
         // Where `sky_light` is worked out; one light for all marched clouds.

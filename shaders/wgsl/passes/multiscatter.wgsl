@@ -7,10 +7,10 @@
 
 // Directions that a point gathers light from: rows above and below its horizon, columns from the sun's azimuth to the
 // other side; and steps along each.
-const ROWS_ABOVE = 10u;
-const ROWS_BELOW = 5u;
+const ROWS_ABOVE = 8u;
+const ROWS_BELOW = 4u;
 const COLUMNS = 6u;
-const STEPS = 16u;
+const STEPS = 10u;
 
 // What arrives at a point: as the tables.
 struct Arriving {

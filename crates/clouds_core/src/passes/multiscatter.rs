@@ -49,6 +49,10 @@ fn bake(ctx: &mut Context<'_>, sum: &wgpu::Texture, air: &Bindings<'_>) -> Resul
     }
     let sum = view(sum);
     let [a, b, c, d] = [0, 1, 2, 3].map(|order: usize| (&orders[order]).into());
-    dispatch("sum_orders", SIZE, &[("mix_a", a), ("mix_b", b), ("mix_c", c), ("mix_d", d), ("map_out", (&sum).into())])?;
+    dispatch(
+        "sum_orders",
+        SIZE,
+        &[("mix_a", a), ("mix_b", b), ("mix_c", c), ("mix_d", d), ("map_out", (&sum).into())],
+    )?;
     work.submit(ctx.timings, ctx.interrupt).map(drop)
 }

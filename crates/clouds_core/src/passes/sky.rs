@@ -52,7 +52,8 @@ impl Sky {
     ) -> Result<Bindings<'_>> {
         let layers = [params.clouds.base, params.clouds.top, params.high_clouds.altitude];
         let from = viewpoint(eye, params);
-        let key = (params::Sun { visible: true, ..params.sun.clone() }, transmittance::air(params), from.to_array(), layers);
+        let key =
+            (params::Sun { visible: true, ..params.sun.clone() }, transmittance::air(params), from.to_array(), layers);
         let (map, share, light) = self.made.get(key, || {
             ctx.uniforms.upload_frame(ctx.gpu, &Frame::new(&Camera::equirect(from)?, params, 0.0, [1, 1]));
             let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());

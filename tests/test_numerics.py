@@ -222,36 +222,6 @@ def test_perlin_is_zero_on_its_lattice():
     )
 
 
-@pytest.mark.parametrize("scale_height", [1200.0, 8000.0])
-def test_air_along_slanted_rays(scale_height):
-    """Chapman's function, by quadrature; its approximation is good to 1 % and finite through the
-    ground.
-    """
-    h = np.array([0.0, 100.0, 5000.0, 60_000.0])
-    mu = np.sin(np.radians([-1, 0, 0.5, 2, 10, 45, 90]))
-    h, mu = (v.ravel() for v in np.meshgrid(h, mu))
-    lowest = (EARTH + h) * np.sqrt(1 - mu**2) - EARTH
-    free = (mu >= 0) | (lowest > 0)
-    wgsl = f"chapman(x.x, x.y, {scale_height})"
-    got = probe(wgsl, np.stack([h, mu], 1), imports=["atmosphere"])[:, 0]
-    assert np.isfinite(got).all() and (got >= 0).all()
-
-    s = np.concatenate([[0], np.logspace(0, 6.5, 40_000)])[:, None]
-    r = EARTH + h
-    along = np.sqrt(r * r + s * s + 2 * r * s * mu) - EARTH
-    expected = np.trapezoid(np.exp(-along / scale_height), s, axis=0)
-    np.testing.assert_allclose(got[free], expected[free], rtol=0.02, atol=1e-3)
-
-
-def test_air_toward_what_stands_above():
-    """The short form for directions up is the same function, to the bit."""
-    h, mu = (v.ravel() for v in np.meshgrid([0.0, 100, 5000, 60_000], np.linspace(0, 1, 101)))
-    at = np.stack([h, mu], 1)
-    whole = probe("vec4f(air_transmittance(x.x, x.y), 1.0)", at, imports=["atmosphere"])
-    up = probe("vec4f(air_transmittance_up(x.x, x.y), 1.0)", at, imports=["atmosphere"])
-    assert (whole == up).all() and whole[:, :3].min() < 0.1 < 0.9 < whole[:, :3].max()
-
-
 def test_zenith_along_a_ray():
     """The cosine from the altitude, which is known, and that from the point."""
     elevation = np.radians(np.linspace(-5, 90, 60))

@@ -406,6 +406,10 @@ class Light(Block):
     ambient_bottom : tuple[float, float, float]
         Tint of the ambient light at the base of the clouds; its brightness comes from sky and
         ground. Allowed: 3 numbers from 0 to 1000.
+    ambient_occlusion : float
+        How much clouds hide sky and ground from themselves: 1 shares the ambient light by their
+        optical depth above and below, 0 by height alone, as the published models do. Allowed: a
+        number from 0 to 1.
     powder : float
         How strongly thin edges darken ("powdered sugar", nubis2015); 0 switches it off. Allowed: a
         number from 0 to 1.
@@ -431,6 +435,7 @@ class Light(Block):
     ambient_gain: float = 1.0
     ambient_top: tuple[float, float, float] = (1.0, 1.0, 1.0)
     ambient_bottom: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    ambient_occlusion: float = 1.0
     powder: float = 0.6
     rain_absorption: float = 2.5
 

@@ -1,6 +1,6 @@
-// The air: Rayleigh, aerosol and ozone with exponential profiles, their optical depths in closed form, and one order of
-// scattering plus an isotropic guess at the rest. A stand-in until the look-up tables of Hillaire 2020; it looks right
-// from noon to the end of dusk, and is not a measured sky.
+// The air (Hillaire 2020): Rayleigh, aerosol and ozone by altitude, and what is baked of them. Around a round planet under
+// a distant sun all that does not depend on a direction depends on two numbers, altitude and the sun's cosine with the
+// zenith, and so fits into small tables.
 #import math
 #import phase
 #import shell
@@ -12,63 +12,74 @@ const MIE_SCATTERING = 3.996e-6;
 const MIE_EXTINCTION = 4.440e-6;
 const MIE_HEIGHT = 1200.0;
 const MIE_G = 0.8;
-// The whole ozone layer straight up: absorption 0.650, 1.881, 0.085e-6 1/m at its middle, a triangle 30 km wide.
-const OZONE = vec3f(0.00975, 0.0282, 0.0013);
+// Ozone absorbs most at its middle, 1/m, and falls to none along a triangle so wide to either side, m. Red is not the
+// table's 0.650e-6, of 680 nm: at the 610 nm that Rec. 709 means, near the top of Chappuis' band, ozone absorbs as much as
+// at 550 or more, without which dusk is purple and no hour is blue.
+const OZONE = vec3f(1.881e-6, 1.881e-6, 0.085e-6);
 const OZONE_ALTITUDE = 25000.0;
+const OZONE_WIDTH = 15000.0;
 // Altitude where the air ends, m (as in frame.rs).
 const AIR_TOP = 100000.0;
+// Radiance of the night's own light, airglow and stars, for a sun of irradiance 1 above the air: 20.9, 21.6 and 22.6
+// magnitudes a square arcsecond in R, V and B (Patat 2003) against the sun's -27.1, -26.74 and -26.09.
+const NIGHT = vec3f(2.7e-9, 2.0e-9, 1.4e-9);
 
-// exp(x^2) erfc(x) for x >= 0: the form 2 / (sqrt(pi) (x + sqrt(x^2 + c))) with c from 4 / pi, exact at 0, to 2, exact far
-// away; between them fitted to 0.1 %.
-fn erfcx(x: f32) -> f32 {
-    let c = 2.0 - (2.0 - 4.0 / PI) * exp(-0.85 * x);
-    return 2.0 / (sqrt(PI) * (x + sqrt(x * x + c)));
+// Shares of Rayleigh, aerosol and ozone at an altitude, 1 where they are densest.
+fn air_parts(h: f32) -> vec3f {
+    let up = max(h, 0.0);
+    let ozone = saturate(1.0 - abs(up - OZONE_ALTITUDE) / OZONE_WIDTH);
+    return vec3f(exp(-up / RAYLEIGH_HEIGHT), params.atmosphere.haze * exp(-up / MIE_HEIGHT), ozone);
 }
 
-// Optical depth of an exponential layer of scale height H from altitude h to space, as a length at sea level: Chapman's
-// function for x = (R + h) / H, sqrt(pi x / 2) erfcx(sqrt(x / 2) mu), which is right to 1 / x.
-fn chapman(h: f32, mu: f32, scale_height: f32) -> f32 {
-    let x = (params.atmosphere.planet_radius + h) / scale_height;
-    let up = chapman_up(h, abs(mu), scale_height);
-    if mu >= 0.0 {
-        return up;
-    }
-    // Through the lowest point of the ray and out again: twice the way up from there, less the part behind.
-    let x0 = sqrt(max(1.0 - mu * mu, 0.0)) * x;
-    let lowest = h - (x - x0) * scale_height;
-    // Through the ground: so deep that nothing arrives, but finite.
-    let below = min(exp(-lowest / scale_height), 1e6);
-    return max(2.0 * scale_height * sqrt(0.5 * PI * x0) * below - up, 0.0);
+fn air_extinction(parts: vec3f) -> vec3f {
+    return RAYLEIGH * parts.x + MIE_EXTINCTION * parts.y + OZONE * parts.z;
 }
 
-// The same for directions up, where mu is not negative: a third of the work.
-fn chapman_up(h: f32, mu: f32, scale_height: f32) -> f32 {
-    let x = (params.atmosphere.planet_radius + h) / scale_height;
-    return scale_height * exp(-max(h, 0.0) / scale_height) * sqrt(0.5 * PI * x) * erfcx(sqrt(0.5 * x) * mu);
+// What the air scatters of light whose direction turns by an angle, given as 1 minus its cosine.
+fn air_scattering_toward(parts: vec3f, one_minus_mu: f32) -> vec3f {
+    let mu = 1.0 - one_minus_mu;
+    let rayleigh = 3.0 / (16.0 * PI) * (1.0 + mu * mu);
+    return RAYLEIGH * (parts.x * rayleigh) + MIE_SCATTERING * (parts.y * henyey_greenstein(one_minus_mu, MIE_G));
 }
 
-// Transmittance of the air from altitude h to space along a direction with zenith cosine mu.
+// Length of a path through an exponential layer between two altitudes, as a length at sea level.
+fn path_length(h0: f32, h1: f32, distance: f32, scale_height: f32) -> f32 {
+    let low = max(min(h0, h1), 0.0);
+    return distance * exp(-low / scale_height) * one_minus_exp_over(abs(h1 - h0) / scale_height);
+}
+
+// Optical depth of a short straight way between two altitudes.
+fn air_depth_between(h0: f32, h1: f32, distance: f32) -> vec3f {
+    let ozone = air_parts(h0).z + 4.0 * air_parts(0.5 * (h0 + h1)).z + air_parts(h1).z;
+    return RAYLEIGH * path_length(h0, h1, distance, RAYLEIGH_HEIGHT)
+        + params.atmosphere.haze * MIE_EXTINCTION * path_length(h0, h1, distance, MIE_HEIGHT)
+        + OZONE * (distance * ozone / 6.0);
+}
+
+// Where in the table of optical depths to space a direction is: by how far it is to the top of the air, between straight
+// up and the horizon, and by the distance of that (Bruneton and Neyret 2008).
+fn air_depth_coordinates(altitude: f32, mu: f32) -> vec2f {
+    let h = clamp(altitude, 0.0, AIR_TOP);
+    let radius = params.atmosphere.planet_radius;
+    let whole = sqrt(AIR_TOP * (2.0 * radius + AIR_TOP));
+    let horizon = sqrt(h * (2.0 * radius + h));
+    let b = (radius + h) * mu;
+    let power = (AIR_TOP - h) * (2.0 * radius + h + AIR_TOP);
+    let s = sqrt(b * b + power);
+    let distance = select(s - b, power / max(s + b, 1e-3), b > 0.0);
+    let nearest = AIR_TOP - h;
+    return vec2f(saturate((distance - nearest) / (horizon + whole - nearest)), horizon / whole);
+}
+
+// Transmittance of the air from altitude h to space along a direction with zenith cosine mu; under the horizon that of
+// the horizon.
 fn air_transmittance(h: f32, mu: f32) -> vec3f {
-    return whole_air_transmittance(h, mu, vec2f(chapman(h, mu, RAYLEIGH_HEIGHT), chapman(h, mu, MIE_HEIGHT)));
-}
-
-// The same for directions up.
-fn air_transmittance_up(h: f32, mu: f32) -> vec3f {
-    return whole_air_transmittance(h, mu, vec2f(chapman_up(h, mu, RAYLEIGH_HEIGHT), chapman_up(h, mu, MIE_HEIGHT)));
-}
-
-// The same for the lengths through the two exponential layers, as at sea level.
-fn whole_air_transmittance(h: f32, mu: f32, lengths: vec2f) -> vec3f {
     if params.atmosphere.enabled == 0u {
         return vec3f(1.0);
     }
-    let radius = params.atmosphere.planet_radius;
-    let ratio = (radius + h) / (radius + OZONE_ALTITUDE);
-    let ozone = OZONE / sqrt(max(1.0 - ratio * ratio * (1.0 - mu * mu), 1e-3));
-    let depth = RAYLEIGH * lengths.x
-        + params.atmosphere.haze * MIE_EXTINCTION * lengths.y
-        + select(ozone, vec3f(0.0), h > OZONE_ALTITUDE);
-    return exp(-depth);
+    let size = vec2f(textureDimensions(air_depth));
+    let uv = (air_depth_coordinates(h, mu) * (size - 1.0) + 0.5) / size;
+    return exp(-textureSampleLevel(air_depth, clamp_sampler, uv, 0.0).rgb);
 }
 
 // How much of the sun stands above the horizon of a point: 0 below it, 1 above, over the sun's half degree.
@@ -78,89 +89,105 @@ fn sun_above_ground(h: f32, mu: f32) -> f32 {
     return smoothstep(-0.005, 0.005, mu - horizon);
 }
 
+// Share of the sun's light that arrives at a point, on a plane that faces it: the air and the planet are in its way.
+fn sunlight(h: f32, mu: f32) -> vec3f {
+    return air_transmittance(h, mu) * sun_above_ground(h, mu);
+}
+
 // Irradiance of the sun at a point, on a plane that faces it.
 fn sun_irradiance(h: f32, mu: f32) -> vec3f {
-    let shadow = sun_above_ground(h, mu);
-    return params.sun.irradiance * air_transmittance(h, mu) * shadow;
+    return params.sun.irradiance * sunlight(h, mu);
 }
 
-// Length of a path through an exponential layer between two altitudes, as a length at sea level.
-fn path_length(h0: f32, h1: f32, distance: f32, scale_height: f32) -> f32 {
-    let low = max(min(h0, h1), 0.0);
-    return distance * exp(-low / scale_height) * one_minus_exp_over(abs(h1 - h0) / scale_height);
+// Tables by altitude and the sun's cosine with the zenith, one below the other, for a sun of irradiance 1.
+const SCATTERED = 0u; // mean radiance of the light that has been scattered, or reflected by the ground, once or more
+const SCATTERED_UP = 1u; // of that the mean of radiance times the squared cosine with the vertical
+const SCATTERED_SUNWARD = 2u; // the same with the horizontal toward the sun
+const FROM_ABOVE = 3u; // its irradiance on a level plane from above, over pi
+const FROM_BELOW = 4u; // the same from below
+const FLUX_SUNWARD = 5u; // the mean of radiance times the cosine with the horizontal toward the sun
+const TABLES = 6u;
+// Texels of a table: the cosine from nadir to zenith, altitude.
+const TABLE_COSINES = 64u;
+const TABLE_ALTITUDES = 24u;
+
+// Light falls by a factor of two or more with every degree of dusk: its logarithm is what is interpolated, around that of
+// a value in the middle, as half floats are finer there.
+const TABLE_MIDDLE = 1e-4;
+
+fn to_table(light: vec3f) -> vec3f {
+    return log(max(light, vec3f(1e-13)) / TABLE_MIDDLE);
 }
 
-// Transmittance of the air between the camera and a point at altitude `h` and distance `t`.
-fn aerial_transmittance(h: f32, t: f32) -> vec3f {
-    if params.atmosphere.enabled == 0u {
-        return vec3f(1.0);
-    }
-    let depth = RAYLEIGH * path_length(frame.altitude, h, t, RAYLEIGH_HEIGHT)
-        + params.atmosphere.haze * MIE_EXTINCTION * path_length(frame.altitude, h, t, MIE_HEIGHT);
-    return exp(-params.atmosphere.aerial_perspective * depth);
+fn from_table(texel: vec3f) -> vec3f {
+    return TABLE_MIDDLE * exp(texel);
 }
 
-// All orders of scattering after the first as one isotropic field, per irradiance of the sun. The more the air scatters
-// at a wavelength the more of its light comes from them: 0.02, 0.05, 0.10 for red, green, blue at noon, a sixth of that
-// at sunset. The form and its four numbers were set by eye against the pictures of Hillaire 2020.
-fn further_orders(h: f32, mu_sun: f32) -> vec3f {
-    let vertical = RAYLEIGH * RAYLEIGH_HEIGHT;
-    let noon = 0.26 * (1.0 - exp(-1.5 * vertical));
-    // Light that has been scattered before has come a higher and shorter way than the direct light.
-    let dimmed = exp(-0.3 * RAYLEIGH * chapman_up(h, max(mu_sun, 0.0), RAYLEIGH_HEIGHT)
-        - OZONE / max(mu_sun + 0.12, 0.12));
-    let height_of_sun = smoothstep(-0.2, 0.5, mu_sun);
-    return noon * dimmed * (0.9 * height_of_sun + 0.1 * smoothstep(-0.25, 0.0, mu_sun));
+// Where a table has an altitude and a cosine: with square roots, as air is densest at the ground and dusk at the horizon.
+fn table_coordinates(table: u32, h: f32, mu: f32) -> vec2f {
+    let cosine = clamp(mu, -1.0, 1.0);
+    let root = sqrt(abs(cosine));
+    let across = 0.5 + 0.5 * select(-root, root, cosine > 0.0);
+    let up = sqrt(saturate(h / AIR_TOP)) + f32(table) * f32(TABLE_ALTITUDES) / f32(TABLE_ALTITUDES - 1u);
+    let column = across * f32(TABLE_COSINES - 1u) + 0.5;
+    let row = up * f32(TABLE_ALTITUDES - 1u) + 0.5;
+    return vec2f(column / f32(TABLE_COSINES), row / f32(TABLES * TABLE_ALTITUDES));
 }
 
-// Radiance of the air along a direction from the camera, up to the ground or to space, for a sun of irradiance 1.
-fn air_radiance(direction: vec3f) -> vec3f {
-    if params.atmosphere.enabled == 0u {
-        return vec3f(0.0);
-    }
-    let air = hit_sphere(direction, frame.power_air);
-    if !air.hit {
-        return vec3f(0.0);
-    }
-    let ground = hit_sphere(direction, frame.power_ground);
-    let end = select(air.far, ground.near, ground.enters);
-    let length = max(end - air.near, 0.0);
-    let one_minus_mu = one_minus_cos(direction, frame.sun_direction);
-    let mu = 1.0 - one_minus_mu;
-    let rayleigh_phase = 3.0 / (16.0 * PI) * (1.0 + mu * mu);
-    let mie_phase = henyey_greenstein(one_minus_mu, MIE_G);
-
-    const STEPS = 48;
-    var radiance = vec3f(0.0);
-    var transmittance = vec3f(1.0);
-    for (var i = 0; i < STEPS; i++) {
-        // Squares put the samples where the air is dense: near the camera.
-        let a = f32(i) / f32(STEPS);
-        let b = f32(i + 1) / f32(STEPS);
-        let step = (b * b - a * a) * length;
-        let p = (air.near + 0.5 * (a * a + b * b) * length) * direction;
-        let h = altitude_at(p);
-        let mu_sun = cos_zenith_at(p, frame.sun_direction);
-        let rayleigh = RAYLEIGH * exp(-max(h, 0.0) / RAYLEIGH_HEIGHT);
-        let mie = params.atmosphere.haze * exp(-max(h, 0.0) / MIE_HEIGHT);
-        let sun = air_transmittance(h, mu_sun) * sun_above_ground(h, mu_sun);
-        let rest = further_orders(h, mu_sun);
-        let source = rayleigh * (rayleigh_phase * sun + rest) + mie * MIE_SCATTERING * (mie_phase * sun + rest);
-        let extinction = rayleigh + mie * MIE_EXTINCTION;
-        let x = extinction * step;
-        let share = vec3f(one_minus_exp_over(x.r), one_minus_exp_over(x.g), one_minus_exp_over(x.b));
-        radiance += transmittance * source * step * share;
-        transmittance *= exp(-x);
-    }
-    return radiance;
+fn air_light_at(table: u32, h: f32, mu: f32) -> vec3f {
+    return from_table(textureSampleLevel(air_light, clamp_sampler, table_coordinates(table, h, mu), 0.0).rgb);
 }
 
-// Radiance of the ground under the sun and a sky that adds a fifth to it.
-fn ground_radiance(mu_sun: f32) -> vec3f {
-    let up = max(mu_sun, 0.0);
-    let sun = params.sun.irradiance * air_transmittance_up(0.0, up) * sun_above_ground(0.0, mu_sun) * up;
-    let skylight = 0.12 * params.sun.irradiance * smoothstep(-0.15, 0.6, mu_sun) * vec3f(0.7, 0.9, 1.2);
-    return params.atmosphere.ground_albedo / PI * (sun + skylight);
+// Light that has been scattered before.
+struct Scattered {
+    mean: vec3f,
+    up: vec3f,
+    sunward: vec3f,
+    flux_up: vec3f,
+    flux_sunward: vec3f,
+}
+
+// What the air sends of it, per metre, in a direction with zenith cosine `mu` and cosine `cosine` with the sun. Rayleigh's
+// phase function, a square, asks of a field of light for no more than its second moments: those across the vertical and
+// the sun's plane follow, and the mixed one is left out. That of aerosol is cut after them (1, g, g^2 of its series).
+fn scattered_again(parts: vec3f, light: Scattered, mu_sun: f32, mu: f32, cosine: f32) -> vec3f {
+    let sine_sun = max(1.0 - mu_sun * mu_sun, 0.0);
+    let level = max(1.0 - mu * mu, 0.0);
+    let toward = cosine - mu * mu_sun;
+    let sunward = select(0.5 * level, min(toward * toward / max(sine_sun, 1e-6), level), sine_sun > 1e-4);
+    let beside = max(light.mean - light.up - light.sunward, vec3f(0.0));
+    let moment = mu * mu * light.up + sunward * light.sunward + (level - sunward) * beside;
+    let flux = mu * light.flux_up + sign(toward) * sqrt(sunward) * light.flux_sunward;
+    let aerosol = light.mean + 3.0 * MIE_G * flux + 2.5 * MIE_G * MIE_G * (3.0 * moment - light.mean);
+    return RAYLEIGH * parts.x * 0.75 * (light.mean + moment) + MIE_SCATTERING * parts.y * max(aerosol, vec3f(0.0));
+}
+
+fn air_scattered(h: f32, mu: f32) -> Scattered {
+    return Scattered(
+        air_light_at(SCATTERED, h, mu),
+        air_light_at(SCATTERED_UP, h, mu),
+        air_light_at(SCATTERED_SUNWARD, h, mu),
+        0.25 * (sky_from_above(h, mu) - sky_from_below(h, mu)),
+        air_light_at(FLUX_SUNWARD, h, mu),
+    );
+}
+
+fn sky_from_above(h: f32, mu: f32) -> vec3f {
+    return air_light_at(FROM_ABOVE, h, mu);
+}
+
+fn sky_from_below(h: f32, mu: f32) -> vec3f {
+    return air_light_at(FROM_BELOW, h, mu);
+}
+
+// Radiance of the ground under sun and sky, for a sun of irradiance 1.
+fn ground_light(mu: f32) -> vec3f {
+    let sun = sunlight(0.0, mu) * max(mu, 0.0) / PI;
+    return params.atmosphere.ground_albedo * (sun + sky_from_above(0.0, mu));
+}
+
+fn ground_radiance(mu: f32) -> vec3f {
+    return params.sun.irradiance * ground_light(mu);
 }
 
 // Coordinates of a direction in the sky map: azimuth from the sun across, angle from the horizon down, with square
@@ -178,21 +205,21 @@ fn sky_coordinates(direction: vec3f) -> vec2f {
     return vec2f(u, v);
 }
 
-// What the sky map holds is the radiance for a sun of irradiance 1, times this: at most 4 in front of the sun, and 1e-7
-// at the end of dusk, both well inside the range of half floats (6e-5 to 65,504). The irradiance itself can be anything.
-const SKY_MAP_SCALE = 1024.0;
-
-// Radiance of the air in a direction, without clouds, sun and ground.
-fn sky_radiance(direction: vec3f) -> vec3f {
-    let size = vec2f(textureDimensions(sky_map));
-    let at = sky_coordinates(direction);
-    // Keep the two halves apart: half a texel from the horizon on either side.
+// The same in texels of a map of so many: the two halves keep apart, half a texel from the horizon on either side.
+fn sky_texel(at: vec2f, size: vec2f) -> vec2f {
     let half_texel = 0.5 / size;
     let v = select(
         clamp(at.y, 0.5 + half_texel.y, 1.0 - half_texel.y),
         clamp(at.y, half_texel.y, 0.5 - half_texel.y),
         at.y < 0.5,
     );
-    let u = mix(half_texel.x, 1.0 - half_texel.x, at.x);
-    return textureSampleLevel(sky_map, clamp_sampler, vec2f(u, v), 0.0).rgb * (params.sun.irradiance / SKY_MAP_SCALE);
+    return vec2f(mix(half_texel.x, 1.0 - half_texel.x, at.x), v);
+}
+
+// What the sky map holds is the radiance for a sun of irradiance 1, times `frame.sky_scale`: at most 4 in front of the sun,
+// and 1e-9 at night, which would not fit into half floats (6e-8 to 65,504) together. The irradiance can be anything.
+// Radiance of the air in a direction, without clouds, sun and ground.
+fn sky_radiance(direction: vec3f) -> vec3f {
+    let uv = sky_texel(sky_coordinates(direction), vec2f(textureDimensions(sky_map)));
+    return textureSampleLevel(sky_map, clamp_sampler, uv, 0.0).rgb * (params.sun.irradiance / frame.sky_scale);
 }

@@ -9,6 +9,7 @@ override VOLUME: bool = false; // the clouds are the user's grid, not procedural
 override KEEP_CLEAR: bool = false; // there is a spot without clouds
 override CAMERA: u32 = 0u; // the projection, see camera.wgsl
 override PRECISE: bool = false; // that grid is read by loads and in f32, not filtered by the hardware in half floats
+override AIR: bool = true; // there is air
 override SUNLIT: bool = true; // the sun can reach the clouds
 override SUN_VOLUME: bool = false; // light from beyond the light samples is read from the sun volume
 override RAINY: bool = true; // it may rain: cumulonimbus grow
@@ -36,7 +37,10 @@ override LIGHT_CHEAP: bool = true; // there are light samples that do not
 @group(0) @binding(49) var profile_table: texture_2d<f32>; // density by type and height (passes/profile)
 @group(0) @binding(50) var phase_table: texture_2d<f32>; // phase function and its integral by angle (passes/phase)
 @group(0) @binding(8) var high_map: texture_2d<f32>; // density of the high clouds (passes/high_clouds)
-@group(0) @binding(9) var sky_map: texture_2d<f32>; // the sky by direction, see SKY_MAP_SCALE (passes/sky)
+@group(0) @binding(9) var sky_map: texture_2d<f32>; // the sky by direction, times frame.sky_scale (passes/sky)
+@group(0) @binding(60) var air_depth: texture_2d<f32>; // of the air to space, by altitude and direction (passes/transmittance)
+@group(0) @binding(61) var air_light: texture_2d<f32>; // scattered light by altitude and sun, see SCATTERED (passes/multiscatter)
+@group(0) @binding(62) var air_share: texture_3d<f32>; // share of the sky before a distance, by direction (passes/sky)
 @group(0) @binding(10) var<storage, read_write> sky_light: array<vec4f, 4>; // what the sky gives to clouds (passes/sky)
 // The same for `composite`: a load from storage costs lavapipe a loop over the lanes. Not for all: as a uniform of number 10
 // it crashed lavapipe (Mesa 22.3.6) in `path`, where it decides a branch; with a number after all others it did not.
@@ -85,6 +89,10 @@ override LIGHT_CHEAP: bool = true; // there are light samples that do not
 // A ray on its way to convergence (passes/reference).
 struct ReferenceRay {
     previous: vec4f, // radiance and transmittance with panels twice as long
+    // As `Gathered`.
+    sun: vec4f,
+    above: vec4f,
+    weight: vec4f,
     stage: u32,
     level: u32, // how many times the panels have been halved
     evaluations: u32,
@@ -95,7 +103,7 @@ struct ReferenceRay {
     end: f32,
     point: u32,
     density: vec2f,
-    height: vec2f,
+    share: vec2f, // of the ambient light from above
     precipitation: vec2f,
     first_depth: f32, // toward the sun, from the first of them
     // The ray from a point toward the sun.
@@ -105,12 +113,7 @@ struct ReferenceRay {
     sun_second: f32,
     sun_x: f32,
     sun_depth: f32,
-    // As `Gathered`.
-    sun: f32,
-    above: f32,
-    below: f32,
-    weight: f32,
-    distance: f32,
+    distance: f32, // as in `Gathered`
 }
 
 // A pixel whose paths are traced one after another (passes/path).
@@ -139,7 +142,7 @@ struct PathRay {
 @group(0) @binding(23) var volume_in: texture_3d<f32>;
 @group(0) @binding(24) var volume_out: texture_storage_3d<rgba16float, write>;
 @group(0) @binding(22) var<storage, read_write> texels_out: array<u32>; // of one channel, two half floats in each
-@group(0) @binding(43) var mix_a: texture_2d<f32>; // weather maps that are mixed
+@group(0) @binding(43) var mix_a: texture_2d<f32>; // weather maps, or orders of scattering, that are mixed
 @group(0) @binding(44) var mix_b: texture_2d<f32>;
 @group(0) @binding(45) var mix_c: texture_2d<f32>;
 @group(0) @binding(46) var mix_d: texture_2d<f32>;

@@ -27,6 +27,8 @@ struct Column {
     precipitation: f32,
     at: vec3f, // where the noises are read: without the wind's lean, the altitude as z, m; in a grid the point itself
     medium: u32,
+    thickness: f32, // of the cloud here from its base to its top, m
+    depth_share: f32, // share of that below the point
 }
 
 // How the three parameters of a cloud meet the weather map (vsu2022: coverage shifts the map).
@@ -105,7 +107,8 @@ fn cloud_column(p: vec3f, altitude: f32) -> Column {
     evaluations += 1u;
     if VOLUME {
         let height = saturate((p.z - frame.volume_low.z) / (frame.volume_high.z - frame.volume_low.z));
-        return Column(select(0.0, 1.0, in_volume(p)), 1.0, 1.0, height, 0.0, p, CLOUD);
+        let thickness = frame.volume_high.z - frame.volume_low.z;
+        return Column(select(0.0, 1.0, in_volume(p)), 1.0, 1.0, height, 0.0, p, CLOUD, thickness, height);
     }
     let at = leant(p.xy, altitude);
     let broad = broad_weather(at);
@@ -187,8 +190,9 @@ fn cloud_in(weather: LocalWeather, at: vec2f, altitude: f32) -> Column {
     let height = (altitude - base) / (cloud_top(rain) - base);
     // The noise is at most 1: where the profile alone does not rise above 1 - coverage, nothing does.
     let inside = height > 0.0 && height < 1.0;
-    var column = Column(0.0, 0.0, weather.coverage, height, rain, vec3f(at, altitude), CLOUD);
+    var column = Column(0.0, 0.0, weather.coverage, height, rain, vec3f(at, altitude), CLOUD, 0.0, 0.0);
     column.profile = select(0.0, height_profile(height, weather.kind, tower(rain)), inside);
+    column = with_extent(column, weather.kind, tower(rain), cloud_top(rain) - base);
     if RAINY {
         let spread = anvil(rain, altitude) * saturate(4.0 * weather.coverage);
         column.profile = max(column.profile, spread);
@@ -196,6 +200,19 @@ fn cloud_in(weather: LocalWeather, at: vec2f, altitude: f32) -> Column {
         column.height = min(height, 1.0);
     }
     column.limit = with_coverage(column.profile, column.coverage);
+    return column;
+}
+
+// From where to where its profile lets a cloud reach: to where it falls below what the coverage asks for.
+fn with_extent(given: Column, kind: f32, rain: f32, whole: f32) -> Column {
+    var column = given;
+    var edges = profile_edges(kind, rain);
+    if PROFILE_TABLE {
+        edges = mix(vec4f(0.0, 0.0, 1.0, 1.0), edges, select(0.0, rain, RAINY));
+    }
+    let top = mix(edges.z, edges.w, column.coverage);
+    column.thickness = max(top - edges.x, 1e-3) * whole;
+    column.depth_share = remap01(column.height, edges.x, top);
     return column;
 }
 
@@ -211,7 +228,8 @@ fn upper_cloud_at(p: vec3f, altitude: f32, broad: vec4f) -> Column {
     let profile = height_profile(height, kind, 0.0);
     let inside = height > 0.0 && height < 1.0;
     let limit = select(0.0, with_coverage(profile, coverage), inside);
-    return Column(limit, profile, coverage, height, 0.0, at, UPPER_CLOUD);
+    let column = Column(limit, profile, coverage, height, 0.0, at, UPPER_CLOUD, 0.0, 0.0);
+    return with_extent(column, kind, 0.0, params.upper_clouds.top - base);
 }
 
 // Streaks are so many times longer than wide.
@@ -223,7 +241,9 @@ fn rain_below(weather: LocalWeather, at: vec2f, altitude: f32) -> Column {
     let wet = weather.precipitation * weather.coverage;
     let limit = select(0.0, saturate(2.0 * wet - 0.6 + 0.6 * height), altitude > 0.0);
     let streak = vec3f(at, altitude / RAIN_STRETCH);
-    return Column(limit, 1.0, 1.0, 0.0, weather.precipitation, streak, RAIN);
+    // All of the cloud is above it.
+    let thickness = cloud_top(weather.precipitation) - params.clouds.base;
+    return Column(limit, 1.0, 1.0, 0.0, weather.precipitation, streak, RAIN, thickness, 0.0);
 }
 
 // The base shape, before detail: cheap, and never smaller than the density. `width` is the size of what one sample

@@ -5,6 +5,8 @@
 #import shell
 #import density
 #import sun_volume
+#import ambient
+#import aerial
 
 // Six directions spread over the unit sphere for the cone of light samples (nubis2015's noise kernel).
 const CONE = array<vec3f, 6>(
@@ -181,53 +183,89 @@ fn dark_depth() -> f32 {
     return MILLIONTH / max(slowest, 1e-6);
 }
 
-// Share of the ambient light at a height that comes from above; the rest comes from below.
-fn ambient_share(height: f32) -> f32 {
-    return saturate(height);
-}
-
-// Ambient radiance from above and from below.
-fn ambient_above() -> vec3f {
-    return ambient_of(sky_light[0].rgb);
-}
-
-fn ambient_of(sky: vec3f) -> vec3f {
+// Ambient radiance at a point: of the sky above, with what the user adds, and of what is below.
+fn ambient_above(sky: vec3f) -> vec3f {
     return params.light.ambient + params.light.ambient_gain * params.light.ambient_top * sky;
 }
 
-fn ambient_below() -> vec3f {
-    return ambient_below_of(sky_light[1].rgb);
+fn ambient_below(ground: vec3f) -> vec3f {
+    return params.light.ambient + params.light.ambient_gain * params.light.ambient_bottom * ground;
 }
 
-fn ambient_below_of(light: vec3f) -> vec3f {
-    return params.light.ambient + params.light.ambient_gain * params.light.ambient_bottom * light;
+// Whether the sun reaches any of the clouds.
+fn is_sunlit() -> bool {
+    if AIR {
+        return SUNLIT;
+    }
+    return any(sky_light[2].rgb > vec3f(0.0));
 }
 
-// What a ray has gathered on its way through the clouds. Scalars alone are summed; colours come once, at the end.
+// What a ray has gathered on its way through the clouds. Scalars alone are summed, for each of the four distances of
+// `Nodes` by its share in the sample's; colours come once, at the end. Without air all have the first.
 struct Gathered {
-    sun: f32, // of sun_scattering
-    above: f32, // share of the ambient light from above
-    below: f32,
-    weight: f32, // of all samples: 1 less the transmittance
+    sun: vec4f, // of sun_scattering
+    above: vec4f, // share of the ambient light from above
+    weight: vec4f, // of all samples: together 1 less the transmittance
     distance: f32, // weighted, m
 }
 
-fn gather(sum: Gathered, weight: f32, sun: f32, height: f32, distance: f32) -> Gathered {
-    let above = ambient_share(height);
+fn gather(sum: Gathered, nodes: Nodes, weight: f32, sun: f32, above: f32, distance: f32) -> Gathered {
+    let reached = sum.distance + weight * distance;
+    if AIR {
+        let w = weight * node_shares(nodes, distance);
+        return Gathered(sum.sun + w * sun, sum.above + w * above, sum.weight + w, reached);
+    }
     return Gathered(
-        sum.sun + weight * sun,
-        sum.above + weight * above,
-        sum.below + weight * (1.0 - above),
-        sum.weight + weight,
-        sum.distance + weight * distance,
+        vec4f(sum.sun.x + weight * sun, 0.0, 0.0, 0.0),
+        vec4f(sum.above.x + weight * above, 0.0, 0.0, 0.0),
+        vec4f(sum.weight.x + weight, 0.0, 0.0, 0.0),
+        reached,
     );
 }
 
-// The radiance of what was gathered.
-fn gathered_radiance(sum: Gathered) -> vec3f {
-    let sun = sum.sun * sky_light[2].rgb;
+// The weight of all samples.
+fn gathered_weight(sum: Gathered) -> f32 {
+    if AIR {
+        return sum.weight.x + sum.weight.y + sum.weight.z + sum.weight.w;
+    }
+    return sum.weight.x;
+}
+
+// The radiance of what was gathered along a ray from the eye, seen through the air.
+fn gathered_radiance(sum: Gathered, nodes: Nodes, direction: vec3f) -> vec3f {
+    if AIR {
+        return radiance_through_air(sum, nodes, direction);
+    }
+    let sun = sum.sun.x * sky_light[2].rgb;
     if MODEL == MODEL_SINGLE {
         return sun;
     }
-    return sun + sum.above * ambient_above() + sum.below * ambient_below();
+    let below = sum.weight.x - sum.above.x;
+    return sun + sum.above.x * ambient_above(vec3f(0.0)) + below * ambient_below(vec3f(0.0));
+}
+
+fn radiance_through_air(sum: Gathered, nodes: Nodes, direction: vec3f) -> vec3f {
+    let way = air_way(direction);
+    let texel = air_share_texel(direction);
+    let sky = sky_radiance(direction);
+    let lit_ground = ground_share() * params.sun.irradiance;
+    var radiance = vec3f(0.0);
+    var depth = vec3f(0.0);
+    var before = min(way.start, nodes.start);
+    for (var k = 0u; k < 4u; k++) {
+        let distance = node_distance(nodes, f32(k));
+        depth += aerial_depth(direction, before, distance, select(PIECES, FIRST_PIECES, k == 0u));
+        before = distance;
+        let air = air_of(depth, distance, way, texel, sky);
+        let p = distance * direction;
+        let h = altitude_at(p);
+        let mu = cos_zenith_at(p, frame.sun_direction);
+        var light = sum.sun[k] * sun_irradiance(h, mu);
+        if MODEL != MODEL_SINGLE {
+            light += sum.above[k] * ambient_above(params.sun.irradiance * sky_from_above(h, mu));
+            light += (sum.weight[k] - sum.above[k]) * ambient_below(lit_ground * sky_from_below(h, mu));
+        }
+        radiance += air.transmittance * light + sum.weight[k] * air.radiance;
+    }
+    return radiance;
 }

@@ -16,6 +16,10 @@ fn one_minus_exp_over(x: f32) -> f32 {
     return (1.0 - exp(-x)) / x;
 }
 
+fn one_minus_exp_over3(x: vec3f) -> vec3f {
+    return vec3f(one_minus_exp_over(x.r), one_minus_exp_over(x.g), one_minus_exp_over(x.b));
+}
+
 // exp(-depth) for an optical depth from 0: 1 exactly for 0, where exp may be 6e-8 less (hazard 8).
 fn transmittance_of(depth: f32) -> f32 {
     return select(exp(-depth), 1.0 - depth * one_minus_exp_over(depth), depth < 0.1);

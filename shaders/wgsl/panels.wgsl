@@ -3,6 +3,7 @@
 #import bindings
 #import shell
 #import density
+#import ambient
 
 // Where the two points lie in a panel: (1 - 1 / sqrt 3) / 2 from its ends.
 const GAUSS = 0.21132486540518713;
@@ -16,7 +17,7 @@ struct Panel {
 // What the field holds at the two points.
 struct Reading {
     density: vec2f,
-    height: vec2f,
+    share: vec2f, // of the ambient light from above
     precipitation: vec2f,
 }
 
@@ -51,7 +52,7 @@ fn read_panel(panel: Panel, origin: vec3f, direction: vec3f, s: Stretches, width
     let b = cloud_column(q, altitude_at(q));
     return Reading(
         vec2f(cloud_density(a, cloud_shape(a, width), width), cloud_density(b, cloud_shape(b, width), width)),
-        vec2f(a.height, b.height),
+        vec2f(ambient_share(a), ambient_share(b)),
         vec2f(a.precipitation, b.precipitation),
     );
 }

@@ -143,6 +143,8 @@ params! {
         /// Cells of that between the lowest and the highest clouds.
         sun_volume_rows: u32 = 1;
 
+        /// By what the sky map is multiplied (atmosphere.wgsl).
+        sky_scale: f32 = 1024.0;
         /// Unit vector toward the sun.
         sun_direction: [f32; 3] = [0.0, 0.0, 1.0];
         /// The middle of the spot to keep clear, relative to the eye, m.
@@ -269,6 +271,13 @@ fn on_map(v: f64, extent: f32, edge: Edge) -> f32 {
     }
 }
 
+/// Altitude of the highest corner of the user's grid, m.
+fn highest(params: &Params, [low, high]: [DVec3; 2]) -> f64 {
+    let radius = f64::from(params.atmosphere.planet_radius);
+    let far = low.abs().max(high.abs());
+    DVec3::new(far.x, far.y, high.z + radius).length() - radius
+}
+
 impl Frame {
     /// The frame of a picture of `size` pixels seen by `camera` at `time` seconds.
     pub fn new(camera: &Camera, params: &Params, time: f64, size: [u32; 2]) -> Self {
@@ -286,6 +295,7 @@ impl Frame {
         frame.sun_direction = sun_direction(params).as_vec3().to_array();
         frame.set_high_sun(params);
         frame.droplet = droplet(f64::from(params.light.droplet_diameter)).map(|v| v as f32);
+        frame.set_sky_scale();
         frame
     }
 
@@ -301,6 +311,11 @@ impl Frame {
 
     /// Whether the sun can reach the clouds: false only where `sky_light` is none (passes/sky.wgsl, atmosphere.wgsl).
     pub fn sunlit(&self, params: &Params) -> bool {
+        if params.atmosphere.enabled {
+            let top =
+                params.volume.as_ref().map_or(f64::from(self.shell_top), |volume| highest(params, volume.bounds()));
+            return self.sun_above(params, top);
+        }
         // Where `sky_light` is worked out; one light for all marched clouds.
         let height = f64::from(0.5 * (params.clouds.base + params.clouds.top));
         let radius = f64::from(params.atmosphere.planet_radius);
@@ -345,16 +360,31 @@ impl Frame {
 
     /// What the sun asks of the high clouds.
     fn set_high_sun(&mut self, params: &Params) {
+        let up = self.sun_above(params, f64::from(params.high_clouds.altitude));
+        self.high_emboss = u32::from(up && params.high_clouds.emboss > 0.0);
+        self.high_low_sun = u32::from(self.sun_sine() < HIGH_LOW_SUN);
+    }
+
+    /// Sine of the sun's height at the eye.
+    fn sun_sine(&self) -> f64 {
+        f64::from(Vec3::from_array(self.zenith).dot(Vec3::from_array(self.sun_direction))).clamp(-1.0, 1.0)
+    }
+
+    /// Whether the sun reaches any cloud in sight up to an altitude.
+    fn sun_above(&self, params: &Params, altitude: f64) -> bool {
         let radius = f64::from(params.atmosphere.planet_radius);
-        let dip = |altitude: f32| (radius / (radius + f64::from(altitude.max(0.0)))).acos();
-        let sine = f64::from(Vec3::from_array(self.zenith).dot(Vec3::from_array(self.sun_direction)));
+        let dip = |altitude: f64| (radius / (radius + altitude.max(0.0))).acos();
         // The farthest of them in sight is as far around the planet as the horizons of the eye and of the layer lie apart,
         // and sees the sun until it is under a horizon of its own.
-        let layer = dip(params.high_clouds.altitude);
-        let lowest = -(dip(self.altitude) + 2.0 * layer + HALF_SUN);
-        let up = sine.clamp(-1.0, 1.0).asin() > lowest && params.sun.irradiance != [0.0; 3];
-        self.high_emboss = u32::from(up && params.high_clouds.emboss > 0.0);
-        self.high_low_sun = u32::from(sine < HIGH_LOW_SUN);
+        let lowest = -(dip(f64::from(self.altitude)) + 2.0 * dip(altitude) + HALF_SUN);
+        self.sun_sine().asin() > lowest && params.sun.irradiance != [0.0; 3]
+    }
+
+    /// What the sky map is multiplied by: the deeper the sun under the horizon, the more, as dusk loses a factor of two or
+    /// more with every degree, to the 18th.
+    fn set_sky_scale(&mut self) {
+        let depth = -self.sun_sine().asin().to_degrees() - f64::from(self.horizon_dip).to_degrees();
+        self.sky_scale = (1024.0 * (0.75 * depth.clamp(0.0, 18.0)).exp2()) as f32;
     }
 
     fn set_camera(&mut self, camera: &Camera) {

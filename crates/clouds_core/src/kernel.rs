@@ -66,6 +66,8 @@ pub(crate) struct Variant {
     pub precise: bool,
     /// Whether there is a spot to keep clear.
     pub keep_clear: bool,
+    /// Whether there is air.
+    pub air: bool,
     /// Whether the sun can reach the clouds.
     pub sunlit: bool,
     /// Whether light is read from the sun volume.
@@ -114,6 +116,7 @@ impl Variant {
             volume: params.volume.is_some(),
             keep_clear: params.clear_spot().1 > 0.0 && params.volume.is_none(),
             precise: quality.tolerance > 0.0 || model == Model::Path,
+            air: params.atmosphere.enabled,
             sunlit: true,
             sun_volume: quality.sun_volume && params.volume.is_none(),
             rainy: params.is_rainy(),
@@ -151,7 +154,7 @@ impl Variant {
         }
     }
 
-    fn constants(self) -> [(&'static str, f64); 23] {
+    fn constants(self) -> [(&'static str, f64); 24] {
         let switch = |on| f64::from(u8::from(on));
         [
             ("MODEL", f64::from(self.model as u32)),
@@ -159,6 +162,7 @@ impl Variant {
             ("VOLUME", switch(self.volume)),
             ("KEEP_CLEAR", switch(self.keep_clear)),
             ("PRECISE", switch(self.precise)),
+            ("AIR", switch(self.air)),
             ("SUNLIT", switch(self.sunlit)),
             ("SUN_VOLUME", switch(self.sun_volume)),
             ("RAINY", switch(self.rainy)),

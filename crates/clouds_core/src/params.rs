@@ -308,6 +308,9 @@ params! {
         ambient_top: [f32; 3] = [1.0, 1.0, 1.0], in 0..=1000 "";
         /// Tint of the ambient light at the base of the clouds; its brightness comes from sky and ground.
         ambient_bottom: [f32; 3] = [1.0, 1.0, 1.0], in 0..=1000 "";
+        /// How much clouds hide sky and ground from themselves: 1 shares the ambient light by their optical depth above and
+        /// below, 0 by height alone, as the published models do.
+        ambient_occlusion: f32 = 1.0, in 0..=1 "";
         /// How strongly thin edges darken ("powdered sugar", nubis2015); 0 switches it off.
         powder: f32 = 0.6, in 0..=1 "";
         /// How many times more light is absorbed where precipitation is 1 (nubis2015).

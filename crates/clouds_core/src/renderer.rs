@@ -20,6 +20,7 @@ use crate::passes::composite::Composed;
 use crate::passes::high_clouds::{self, HighClouds};
 use crate::passes::majorant::Majorants;
 use crate::passes::march::Marched;
+use crate::passes::multiscatter::Multiscatter;
 use crate::passes::noise::Noise;
 use crate::passes::phase::PhaseTable;
 use crate::passes::profile::Profile;
@@ -29,6 +30,7 @@ use crate::passes::reproject::{ORDER, STRIDE};
 use crate::passes::shadow::{self, GroundShadow};
 use crate::passes::sky::Sky;
 use crate::passes::sun_volume::SunVolume;
+use crate::passes::transmittance::Transmittance;
 use crate::passes::volume::Volume;
 use crate::passes::weather::Weather;
 use crate::passes::{Bindings, Context, Scene, Uniforms, composite, march, path, points, reference, refine, reproject};
@@ -80,7 +82,12 @@ enum Method {
 }
 
 /// The kernels of the bakes that are kept from no earlier process.
-const BAKES: [(&str, &str); 2] = [("sky", "sky_map_bake"), ("sky", "sky_light_bake")];
+const BAKES: [(&str, &str); 4] = [
+    ("transmittance", "transmittance_bake"),
+    ("sky", "sky_map_bake"),
+    ("sky", "air_share_bake"),
+    ("sky", "sky_light_bake"),
+];
 
 impl Method {
     /// The kernels of a still.
@@ -669,6 +676,8 @@ struct World {
     profile: Profile,
     phase: PhaseTable,
     high_clouds: HighClouds,
+    transmittance: Transmittance,
+    multiscatter: Multiscatter,
     sky: Sky,
     volume: Volume,
     majorants: Majorants,
@@ -694,6 +703,8 @@ impl World {
             profile: Profile::new(),
             phase: PhaseTable::new(),
             high_clouds: HighClouds::new(),
+            transmittance: Transmittance::new(),
+            multiscatter: Multiscatter::new(),
             sky: Sky::new(),
             volume: Volume::new(),
             majorants: Majorants::new(),
@@ -726,7 +737,10 @@ impl World {
         let profile = self.profile.run(&ctx, params)?; // once for a table
         let phase = self.phase.run(&ctx, params)?; // once for a droplet
         let high_clouds = self.high_clouds.run(&mut ctx, params, frame)?; // as they evolve
-        let sky = self.sky.run(&mut ctx, params, frame, at.0)?; // when sun or air change, or the eye has gone far
+        let mut air = self.transmittance.run(&mut ctx, params)?; // when the air changes
+        let multiscatter = self.multiscatter.run(&mut ctx, params, &air)?; // when the air or the ground change
+        air.extend(multiscatter);
+        let sky = self.sky.run(&mut ctx, params, frame, at.0, &air)?; // when sun or air change, or the eye has gone far
 
         ctx.variant = variant; // those so far know no picture
         let volume = self.volume.run(&ctx, params)?; // once for a grid
@@ -734,7 +748,7 @@ impl World {
         let blue_noise = vec![("blue_noise", (&self.blue_noise).into())];
         let uniforms = self.uniforms.bindings();
         let mut bindings: Bindings<'_> =
-            [uniforms, noise.bindings(), weather, broad_weather, profile, phase, high_clouds, sky, volume, blue_noise]
+            [uniforms, noise.bindings(), weather, broad_weather, profile, phase, high_clouds, air, sky, volume, blue_noise]
                 .concat();
         let majorants = self.majorants.run(&mut ctx, params, &bindings)?; // when paths are traced
         bindings.extend(majorants);

@@ -16,6 +16,11 @@ override LAYERS: bool = true; // the sky and the depth are asked for
 
 // The sun's angular radius, 0.2666 degrees (IAU: 695 700 km at 1 au).
 const SUN_RADIUS = 0.004654;
+// Exponents of the cosine at the sun's surface by which its limb darkens, at 680, 550 and 440 nm (Hestroffer and Magnan
+// 1998, after Hillaire 2016).
+const LIMB = vec3f(0.397, 0.503, 0.652);
+// Pieces of the way to the ground.
+const GROUND_PIECES = 8u;
 
 // Height above or below the high clouds at which an eye sees all of them, m. Short, as a place in the sky without them is
 // wrong too, and long enough that a level ray, which meets 50 times the layer, changes by 25 % a metre at the default.
@@ -50,14 +55,22 @@ fn composite(@builtin(global_invocation_id) id: vec3u) {
     let direction = view.xyz;
     let scene = scene_distance(pixel);
     let ground = hit_sphere(direction, frame.power_ground);
-    let air = Air(sky_radiance(direction), whole_air(direction, ground));
+    var way = Way(0.0, 0.0, ground.enters);
+    var texel = vec2f(0.0);
+    var air = Air(vec3f(1.0), vec3f(0.0));
+    if AIR {
+        way = air_way(direction);
+        texel = air_share_texel(direction);
+        air = Air(whole_air(direction, way), sky_radiance(direction));
+    }
 
     var here = Layer(vec3f(0.0), 1.0, 0.0);
     if !CLOUDLESS {
         let cloud = clouds[index];
         here = Layer(cloud.rgb, cloud.a, max(cloud_depth[index], 0.0));
     }
-    var seen = through_air(here, altitude_at(here.distance * direction), air);
+    // The march has seen them through the air.
+    var seen = Layer(here.radiance, here.transmittance, (1.0 - here.transmittance) * here.distance);
     if HIGH {
         // The high clouds where the ray enters their sphere, which it cannot from inside, and where it leaves it; each
         // before or behind the clouds. The loop costs lavapipe one of the two where there is one, a branch both.
@@ -68,7 +81,7 @@ fn composite(@builtin(global_invocation_id) id: vec3u) {
         loop {
             let at = select(high.near, high.far, crossing == 1);
             let hit = high.hit && at > 0.0 && at < scene && !(ground.enters && at > ground.near);
-            let layer = through_air(high_layer(direction, at, hit), params.high_clouds.altitude, air);
+            let layer = through_air(high_layer(direction, at, hit), direction, way, texel, air.radiance);
             if at < here.distance {
                 before = over(before, layer);
             } else {
@@ -85,7 +98,7 @@ fn composite(@builtin(global_invocation_id) id: vec3u) {
     var background = air.radiance;
     if ground.enters {
         let p = ground.near * direction;
-        var lit = select(vec3f(0.0), ground_radiance(cos_zenith_at(p, frame.sun_direction)), params.atmosphere.enabled > 0u);
+        var lit = ground_seen(p);
         if GROUND_SHADOW {
             lit = ground_in_shadow(lit, p);
         }
@@ -96,11 +109,10 @@ fn composite(@builtin(global_invocation_id) id: vec3u) {
     var opacity = 1.0;
     if SCENE && scene < NO_SCENE {
         let bright = scene_radiance(pixel);
-        let altitude = altitude_at(scene * direction);
-        background = through_air(Layer(bright, 0.0, scene), altitude, air).radiance;
+        background = through_air(Layer(bright, 0.0, scene), direction, way, texel, air.radiance).radiance;
         if frame.scene_lit == 0u {
             // The caller puts a scene of his own behind: what he adds is dimmed by cloud and air.
-            let white = through_air(Layer(vec3f(1.0), 0.0, scene), altitude, air).radiance;
+            let white = through_air(Layer(vec3f(1.0), 0.0, scene), direction, way, texel, air.radiance).radiance;
             opacity = 1.0 - seen.transmittance * dot(white - background, LUMINANCE);
         }
     }
@@ -128,23 +140,25 @@ fn ground_in_shadow(lit: vec3f, p: vec3f) -> vec3f {
         sun *= exp(-high_depth_over(p, mu));
     }
     // As in `ground_radiance`.
-    let up = max(mu, 0.0);
-    let direct = params.sun.irradiance * air_transmittance_up(0.0, up) * sun_above_ground(0.0, mu) * up;
+    let direct = sun_irradiance(0.0, mu) * max(mu, 0.0);
     return max(lit - (1.0 - sun) * params.atmosphere.ground_albedo / PI * direct, vec3f(0.0));
 }
 
-// All the air along a ray, up to the ground or to space.
-struct Air {
-    radiance: vec3f,
-    transmittance: vec3f,
+fn ground_seen(p: vec3f) -> vec3f {
+    if AIR {
+        return ground_radiance(cos_zenith_at(p, frame.sun_direction));
+    }
+    return vec3f(0.0);
 }
 
-// A layer at an altitude behind the air in front of it, which holds its share of the light of all the air.
-fn through_air(layer: Layer, altitude: f32, air: Air) -> Layer {
-    let seen = aerial_transmittance(altitude, layer.distance);
-    let share = (1.0 - seen) / max(1.0 - air.transmittance, 1.0 - seen + vec3f(1e-6));
+// A layer at a distance behind the air in front of it.
+fn through_air(layer: Layer, direction: vec3f, way: Way, texel: vec2f, sky: vec3f) -> Layer {
     let opacity = 1.0 - layer.transmittance;
-    let radiance = layer.radiance * seen + opacity * share * air.radiance;
+    if !AIR {
+        return Layer(layer.radiance, layer.transmittance, opacity * layer.distance);
+    }
+    let air = air_before(direction, layer.distance, way, texel, sky);
+    let radiance = layer.radiance * air.transmittance + opacity * air.radiance;
     return Layer(radiance, layer.transmittance, opacity * layer.distance);
 }
 
@@ -156,18 +170,15 @@ fn over(front: Layer, back: Layer) -> Layer {
     );
 }
 
-// Transmittance of all the air along a ray.
-fn whole_air(direction: vec3f, ground: Hit) -> vec3f {
-    if ground.enters {
-        return aerial_transmittance(0.0, ground.near);
+// Transmittance of all the air along a ray: to the ground, or to space from where it enters the air.
+fn whole_air(direction: vec3f, way: Way) -> vec3f {
+    if way.grounded {
+        let depth = aerial_depth(direction, way.start, way.start + way.length, GROUND_PIECES);
+        return exp(-params.atmosphere.aerial_perspective * depth);
     }
-    let air = hit_sphere(direction, frame.power_air);
-    if !air.hit {
-        return vec3f(1.0);
-    }
-    // From above the air, start where the ray enters it.
     let altitude = select(max(frame.altitude, 0.0), AIR_TOP, frame.power_air > 0.0);
-    return air_transmittance(altitude, cos_zenith_along(direction, air.near, altitude));
+    let through = air_transmittance(altitude, cos_zenith_along(direction, way.start, altitude));
+    return select(vec3f(1.0), through, way.length > 0.0);
 }
 
 // Smallest cosine that counts for the way of sunlight through the high clouds: they are 300 m thick (thesis2018: 200 to
@@ -207,7 +218,9 @@ fn high_layer(direction: vec3f, distance: f32, visible: bool) -> Layer {
     if MODEL != MODEL_SINGLE {
         // Overcast is grey: from below, only what it lets through comes from above.
         let through = select(1.0, 1.0 / (1.0 + HIGH_ALBEDO * optical_depth), cosine > 0.0);
-        radiance += mix(ambient_below_of(sky_light_uniform[1].rgb), ambient_of(sky_light_uniform[0].rgb), through);
+        // The ground has what they and those under them let through.
+        let ground = ground_share() * mix(1.0, 1.0 / (1.0 + HIGH_ALBEDO * optical_depth), params.high_clouds.coverage);
+        radiance += mix(ambient_below(ground * sky_light_uniform[1].rgb), ambient_above(sky_light_uniform[0].rgb), through);
     }
     return Layer((1.0 - transmittance) * radiance, transmittance, distance);
 }
@@ -242,5 +255,8 @@ fn sun_disc(direction: vec3f) -> vec3f {
     let angle = sqrt(2.0 * one_minus_cos(direction, frame.sun_direction));
     let edge = max(pixel_width(), 1e-4);
     let cover = saturate((SUN_RADIUS - angle) / edge + 0.5);
-    return cover * params.sun.irradiance / (PI * SUN_RADIUS * SUN_RADIUS);
+    // Its limb is darker (Hestroffer and Magnan 1998), whole it is as bright as the irradiance says.
+    let ratio = min(angle / SUN_RADIUS, 1.0);
+    let limb = pow(vec3f(max(1.0 - ratio * ratio, 0.02)), 0.5 * LIMB);
+    return cover * params.sun.irradiance * limb * (1.0 + 0.5 * LIMB) / (PI * SUN_RADIUS * SUN_RADIUS);
 }

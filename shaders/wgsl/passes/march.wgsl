@@ -127,7 +127,8 @@ fn march_ray(direction: vec3f, limit: f32, offset: f32, within: vec2f) -> Cloud 
     }
     let steps = ray_steps(stretches.start, length, direction);
     let pixel_size = pixel_width();
-    let sunlit = any(sky_light[2].rgb > vec3f(0.0));
+    let sunlit = is_sunlit();
+    let nodes = ray_nodes(stretches.start, stretch_distance(stretches, length) - stretches.start);
 
     let one_minus_mu = one_minus_cos(direction, frame.sun_direction);
     var sum = Gathered();
@@ -182,7 +183,7 @@ fn march_ray(direction: vec3f, limit: f32, offset: f32, within: vec2f) -> Cloud 
                     depth_to_sun = optical_depth_to_sun(at.p, 1.0 - transmittance, at.width);
                 }
                 let sun = sun_scattering(depth_to_sun, column.precipitation, one_minus_mu);
-                sum = gather(sum, weight, sun, column.height, at.t);
+                sum = gather(sum, nodes, weight, sun, ambient_share(column), at.t);
                 let from_start = step_distance(steps, f32(i));
                 span = vec2f(min(span.x, from_start - at.length), from_start);
                 optical_depth += x;
@@ -197,7 +198,8 @@ fn march_ray(direction: vec3f, limit: f32, offset: f32, within: vec2f) -> Cloud 
             break;
         }
     }
-    if sum.weight <= 0.0 {
+    let weight = gathered_weight(sum);
+    if weight <= 0.0 {
         return Cloud(vec3f(0.0), 1.0, -1.0, NOWHERE);
     }
 
@@ -208,5 +210,5 @@ fn march_ray(direction: vec3f, limit: f32, offset: f32, within: vec2f) -> Cloud 
         transmittance = 0.0;
         span.y = EVERYWHERE.y;
     }
-    return Cloud(scale * gathered_radiance(sum), transmittance, sum.distance / sum.weight, span);
+    return Cloud(scale * gathered_radiance(sum, nodes, direction), transmittance, sum.distance / weight, span);
 }

@@ -36,7 +36,7 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
     let pixel = vec2u(index % frame.width, frame.sheet_row + index / frame.width);
     let view = view_direction(vec2f(pixel) + 0.5);
     let pixel_size = pixel_width();
-    let sunlit = any(sky_light[2].rgb > vec3f(0.0));
+    let sunlit = is_sunlit();
 
     var ray = path_rays[index];
     evaluations = ray.evaluations;
@@ -86,13 +86,20 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
                 ray.scatterings += 1u;
                 ray.throughput *= params.light.albedo;
                 ray.distance += select(0.0, t, ray.scatterings == 1u);
+                if AIR && ray.scatterings == 1u {
+                    // The rest of the path is seen through the air.
+                    let way = air_way(direction);
+                    let air = air_before(direction, t, way, air_share_texel(direction), sky_radiance(direction));
+                    ray.throughput *= air.transmittance;
+                    ray.light = air.radiance;
+                }
                 ray.origin = p;
                 ray.x = 0.0;
                 if ray.scatterings > quality.path_scatterings {
                     ray = path_ended(ray);
                 } else if sunlit {
                     let phase = path_phase(one_minus_cos(direction, frame.sun_direction));
-                    ray.sunlight = ray.throughput * phase * sky_light[2].rgb;
+                    ray.sunlight = ray.throughput * phase * sun_at(p);
                     ray.shadow = 1.0;
                     ray.flight = flight_from(p, frame.sun_direction);
                     ray.stage = SHADOW;
@@ -126,6 +133,13 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
 fn draw(ray: ptr<function, PathRay>, pixel: vec2u) -> vec3f {
     (*ray).draws += 1u;
     return random3(vec3u(pixel.y * frame.width + pixel.x, frame.first_sample + (*ray).done, (*ray).draws), 0u);
+}
+
+fn sun_at(p: vec3f) -> vec3f {
+    if AIR {
+        return sun_irradiance(altitude_at(p), cos_zenith_at(p, frame.sun_direction));
+    }
+    return sky_light[2].rgb;
 }
 
 fn view_flight(view: vec4f, limit: f32) -> vec4f {
@@ -194,7 +208,7 @@ fn escaped(given: PathRay, pixel: vec2u) -> PathRay {
         return path_ended(ray);
     }
     ray.light += ray.throughput * params.light.ambient;
-    if params.atmosphere.enabled == 0u {
+    if !AIR {
         return path_ended(ray);
     }
     let ground = hit_ground_from(ray.origin, ray.direction);

@@ -46,7 +46,8 @@ fn reference(@builtin(global_invocation_id) id: vec3u) {
     let length = select(0.0, min(stretches.first + stretches.second, room), view.w > 0.0);
     let empty = length <= 0.0 || (!VOLUME && !UPPER && params.clouds.coverage <= 0.0);
     let one_minus_mu = one_minus_cos(direction, frame.sun_direction);
-    let sunlit = any(sky_light[2].rgb > vec3f(0.0));
+    let sunlit = is_sunlit();
+    let nodes = ray_nodes(stretches.start, stretch_distance(stretches, length) - stretches.start);
     let opaque = dark_depth();
     let pixel_size = pixel_width();
 
@@ -59,10 +60,9 @@ fn reference(@builtin(global_invocation_id) id: vec3u) {
             ray.x = 0.0;
             ray.longest = 1e30;
             ray.optical_depth = 0.0;
-            ray.sun = 0.0;
-            ray.above = 0.0;
-            ray.below = 0.0;
-            ray.weight = 0.0;
+            ray.sun = vec4f(0.0);
+            ray.above = vec4f(0.0);
+            ray.weight = vec4f(0.0);
             ray.distance = 0.0;
             ray.stage = VIEW;
         }
@@ -112,7 +112,7 @@ fn reference(@builtin(global_invocation_id) id: vec3u) {
         } else {
             ray.end = panel.end;
             ray.density = reading.density;
-            ray.height = reading.height;
+            ray.share = reading.share;
             ray.precipitation = reading.precipitation;
             ray.longest = 2.0 * (panel.end - panel.begin);
             ray.point = 0u;
@@ -149,17 +149,16 @@ fn reference(@builtin(global_invocation_id) id: vec3u) {
                 sun.y = sun_scattering(ray.sun_depth, ray.precipitation.y, one_minus_mu);
             }
             let uneven = abs(ray.sun_depth - ray.first_depth) > finer * UNEVEN
-                && weight * abs(sun.x - sun.y) > 0.1 * quality.tolerance * (ray.sun + DARK);
+                && weight * abs(sun.x - sun.y) > 0.1 * quality.tolerance * (dot(ray.sun, vec4f(1.0)) + DARK);
             ray.stage = VIEW;
             if uneven && ray.end - ray.x > 1.5 * shortest_panel(stretches, ray.x) {
                 ray.longest = 0.5 * (ray.end - ray.x);
             } else {
-                var sum = Gathered(ray.sun, ray.above, ray.below, ray.weight, ray.distance);
-                sum = gather(sum, first * weight, sun.x, ray.height.x, stretch_distance(stretches, points.x));
-                sum = gather(sum, (1.0 - first) * weight, sun.y, ray.height.y, stretch_distance(stretches, points.y));
+                var sum = Gathered(ray.sun, ray.above, ray.weight, ray.distance);
+                sum = gather(sum, nodes, first * weight, sun.x, ray.share.x, stretch_distance(stretches, points.x));
+                sum = gather(sum, nodes, (1.0 - first) * weight, sun.y, ray.share.y, stretch_distance(stretches, points.y));
                 ray.sun = sum.sun;
                 ray.above = sum.above;
-                ray.below = sum.below;
                 ray.weight = sum.weight;
                 ray.distance = sum.distance;
                 ray.optical_depth += x;
@@ -167,7 +166,7 @@ fn reference(@builtin(global_invocation_id) id: vec3u) {
             }
         }
         if empty || (ray.stage == VIEW && (ray.x >= length || ray.optical_depth > OPAQUE)) {
-            ray = finished(ray, index, empty);
+            ray = finished(ray, index, nodes, direction, empty);
         }
     }
     ray.evaluations = evaluations;
@@ -176,16 +175,17 @@ fn reference(@builtin(global_invocation_id) id: vec3u) {
 }
 
 // A ray that has come to its end: done, or from the start again with panels half as long.
-fn finished(given: ReferenceRay, index: u32, empty: bool) -> ReferenceRay {
+fn finished(given: ReferenceRay, index: u32, nodes: Nodes, direction: vec3f, empty: bool) -> ReferenceRay {
     var ray = given;
-    let sum = Gathered(ray.sun, ray.above, ray.below, ray.weight, ray.distance);
-    let result = vec4f(gathered_radiance(sum), transmittance_of(ray.optical_depth));
+    let sum = Gathered(ray.sun, ray.above, ray.weight, ray.distance);
+    let whole = gathered_weight(sum);
+    let result = vec4f(gathered_radiance(sum, nodes, direction), transmittance_of(ray.optical_depth));
     let change = abs(result - ray.previous);
     let dark = DARK * sky_light[2].rgb;
     let steady = all(change.rgb <= quality.tolerance * (result.rgb + dark)) && change.a <= 0.1 * quality.tolerance;
     if empty || (ray.level > 0u && steady) || ray.level >= MOST_HALVINGS || (ray.level > 0u && evaluations > MOST_EVALUATIONS) {
         clouds[index] = select(result, vec4f(0.0, 0.0, 0.0, 1.0), empty);
-        cloud_depth[index] = select(-1.0, sum.distance / sum.weight, !empty && sum.weight > 0.0);
+        cloud_depth[index] = select(-1.0, sum.distance / whole, !empty && whole > 0.0);
         samples[index] = evaluations;
         uncertainty[index] = select(vec4f(change.rgb, 0.0), vec4f(0.0), empty);
         ray.stage = DONE;

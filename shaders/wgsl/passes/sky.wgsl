@@ -1,6 +1,10 @@
-// Bakes the sky around the camera, and what it and the sun give to the clouds.
+// Bakes the sky around the camera, how much of it lies before each distance, and what it and the sun give to the clouds.
 #import bindings
 #import atmosphere
+#import aerial
+
+// Steps of a ray of the sky.
+const STEPS = 48u;
 
 // The radiance of the sky by azimuth from the sun and angle from the horizon.
 @compute @workgroup_size(8, 8)
@@ -9,13 +13,19 @@ fn sky_map_bake(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= size) {
         return;
     }
-    // The inverse of sky_coordinates, for texel centres.
-    let azimuth = f32(id.x) / f32(size.x - 1u) * PI;
-    let v = (f32(id.y) + 0.5) / f32(size.y);
+    let direction = texel_direction(vec2f(id.xy), vec2f(size));
+    let radiance = min(frame.sky_scale * air_radiance(direction), vec3f(65504.0));
+    textureStore(map_out, id.xy, vec4f(radiance, 1.0));
+}
+
+// The inverse of sky_coordinates, for texel centres.
+fn texel_direction(texel: vec2f, size: vec2f) -> vec3f {
+    let azimuth = texel.x / (size.x - 1.0) * PI;
+    let v = (texel.y + 0.5) / size.y;
     let above = (1.0 - 2.0 * v) * (1.0 - 2.0 * v) * (0.5 * PI + frame.horizon_dip);
     let below = (2.0 * v - 1.0) * (2.0 * v - 1.0) * (0.5 * PI - frame.horizon_dip);
     let elevation = select(-below, above, v < 0.5) - frame.horizon_dip;
-    textureStore(map_out, id.xy, vec4f(SKY_MAP_SCALE * air_radiance(sky_direction(azimuth, elevation)), 1.0));
+    return sky_direction(azimuth, elevation);
 }
 
 // The direction at an azimuth from the sun and an angle above the horizontal plane.
@@ -31,38 +41,86 @@ fn sky_direction(azimuth: f32, elevation: f32) -> vec3f {
     return cos(elevation) * level + sin(elevation) * frame.zenith;
 }
 
-var<workgroup> partial: array<vec3f, 64>;
-
-// Four colours: ambient radiance from above and from below the clouds, irradiance of the sun at the middle of the
-// clouds and at the high clouds. One workgroup; each thread takes a slice of azimuth.
-@compute @workgroup_size(64)
-fn sky_light_bake(@builtin(local_invocation_index) thread: u32) {
-    const ROWS = 16u;
-    let azimuth = (f32(thread) + 0.5) / 64.0 * PI;
-    var sum = vec3f(0.0);
-    for (var row = 0u; row < ROWS; row++) {
-        // Equal shares of the cosine-weighted hemisphere.
-        let sine = sqrt((f32(row) + 0.5) / f32(ROWS));
-        sum += air_radiance(sky_direction(azimuth, asin(sine))) / f32(ROWS);
+// Radiance of the air along a direction from the camera, up to the ground or to space, for a sun of irradiance 1.
+fn air_radiance(direction: vec3f) -> vec3f {
+    let way = air_way(direction);
+    if params.atmosphere.enabled == 0u || way.length <= 0.0 {
+        return vec3f(0.0);
     }
-    partial[thread] = sum;
-    workgroupBarrier();
-    if thread > 0u {
+    // By squares from the lowest point of the ray, where the air is densest.
+    let b = frame.centre_distance * dot(frame.zenith, direction);
+    let lowest = clamp(-b - way.start, 0.0, way.length);
+    let from_s = -sqrt(lowest);
+    let to_s = sqrt(way.length - lowest);
+    var light = AirLight(vec3f(0.0), vec3f(0.0));
+    for (var i = 0u; i < STEPS; i++) {
+        let s = mix(vec3f(from_s), vec3f(to_s), (f32(i) + vec3f(0.0, 0.5, 1.0)) / f32(STEPS));
+        let t = lowest + s * abs(s);
+        light = air_step(light, direction, way.start + t.y, t.z - t.x);
+    }
+    return light.radiance + select(exp(-light.depth) * NIGHT, vec3f(0.0), way.grounded);
+}
+
+// Light and optical depth of the air up to some distance.
+struct AirLight {
+    radiance: vec3f,
+    depth: vec3f,
+}
+
+fn air_step(before: AirLight, direction: vec3f, t: f32, step: f32) -> AirLight {
+    let p = t * direction;
+    let h = altitude_at(p);
+    let mu_sun = cos_zenith_at(p, frame.sun_direction);
+    let parts = air_parts(h);
+    let one_minus_cosine = one_minus_cos(direction, frame.sun_direction);
+    let once = air_scattering_toward(parts, one_minus_cosine) * sunlight(h, mu_sun);
+    let again = scattered_again(parts, air_scattered(h, mu_sun), mu_sun, cos_zenith_at(p, direction), 1.0 - one_minus_cosine);
+    let source = once + again;
+    let x = air_extinction(parts) * step;
+    let radiance = before.radiance + exp(-before.depth) * source * step * one_minus_exp_over3(x);
+    return AirLight(radiance, before.depth + x);
+}
+
+// The share of the sky's radiance that comes from before a distance, by direction and by the root of that distance.
+@compute @workgroup_size(8, 8)
+fn air_share_bake(@builtin(global_invocation_id) id: vec3u) {
+    let size = textureDimensions(volume_out);
+    if any(id.xy >= size.xy) {
         return;
     }
-    var above = vec3f(0.0);
-    for (var i = 0u; i < 64u; i++) {
-        above += partial[i] / 64.0;
+    const SLICES = 24u; // as in passes/sky.rs
+    const STEPS_EACH = 2u;
+    let direction = texel_direction(vec2f(id.xy), vec2f(size.xy));
+    let way = air_way(direction);
+    var reached: array<vec3f, SLICES>;
+    var light = AirLight(vec3f(0.0), vec3f(0.0));
+    for (var i = 0u; i < SLICES; i++) {
+        reached[i] = light.radiance;
+        for (var j = 0u; j < STEPS_EACH; j++) {
+            let s = vec3f(f32(STEPS_EACH * i + j)) + vec3f(0.0, 0.5, 1.0);
+            let t = s * s / f32((SLICES - 1u) * STEPS_EACH * (SLICES - 1u) * STEPS_EACH) * way.length;
+            if i + 1u < SLICES {
+                light = air_step(light, direction, way.start + t.y, t.z - t.x);
+            }
+        }
     }
-    above *= params.sun.irradiance;
+    for (var i = 0u; i < SLICES; i++) {
+        let x = f32(i) / f32(SLICES - 1u);
+        // In the dark it is the way that counts.
+        let share = select(vec3f(x * x), reached[i] / max(light.radiance, vec3f(1e-15)), light.radiance > vec3f(1e-12));
+        textureStore(volume_out, vec3u(id.xy, i), vec4f(share, 1.0));
+    }
+}
+
+// Four colours: ambient radiance from above and from below at the middle of the clouds, irradiance of the sun there and at
+// the high clouds.
+@compute @workgroup_size(1)
+fn sky_light_bake() {
     let middle = 0.5 * (params.clouds.base + params.clouds.top);
     let mu = dot(frame.zenith, frame.sun_direction);
-    let ground = select(vec3f(0.0), ground_radiance(mu), params.atmosphere.enabled > 0u);
-    // Much of what a cloud sees is other clouds, which are as bright as the sky but white; more so at its base, where
-    // half is the ground, and the rest is sky between clouds.
-    let white = vec3f(dot(above, vec3f(0.2126, 0.7152, 0.0722)));
-    sky_light[0] = vec4f(mix(above, white, 0.4), 1.0);
-    sky_light[1] = vec4f(0.5 * ground + 0.35 * mix(above, white, 0.7), 1.0);
+    let air = select(vec3f(0.0), params.sun.irradiance, params.atmosphere.enabled > 0u);
+    sky_light[0] = vec4f(air * sky_from_above(middle, mu), 1.0);
+    sky_light[1] = vec4f(air * sky_from_below(middle, mu), 1.0);
     sky_light[2] = vec4f(sun_irradiance(middle, mu), 1.0);
     sky_light[3] = vec4f(sun_irradiance(params.high_clouds.altitude, mu), 1.0);
 }

@@ -5,6 +5,7 @@ pub mod composite;
 pub mod high_clouds;
 pub mod majorant;
 pub mod march;
+pub mod multiscatter;
 pub mod noise;
 pub mod path;
 pub mod phase;
@@ -17,6 +18,7 @@ pub mod reproject;
 pub mod shadow;
 pub mod sky;
 pub mod sun_volume;
+pub mod transmittance;
 pub mod volume;
 pub mod weather;
 

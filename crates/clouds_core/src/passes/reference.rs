@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::frame::Frame;
 
 /// Bytes of a `ReferenceRay` of bindings.wgsl.
-pub const RAY_BYTES: u64 = 144;
+pub const RAY_BYTES: u64 = 192;
 
 /// Integrates the band of `frame`.
 pub(crate) fn run(ctx: &mut Context<'_>, scene: &Scene<'_>, frame: &Frame, rays: &Rays, out: &Marched) -> Result<()> {

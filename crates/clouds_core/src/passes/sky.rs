@@ -2,8 +2,7 @@
 
 use glam::DVec3;
 
-use super::weather::bake_map;
-use super::{Baked, Bindings, Context};
+use super::{Baked, Bindings, Context, transmittance};
 use crate::camera::Camera;
 use crate::error::Result;
 use crate::frame::Frame;
@@ -11,6 +10,9 @@ use crate::params::{self, Params};
 
 /// Texels of the sky map: azimuth from the sun, angle from the horizon.
 const SIZE: [u32; 3] = [128, 160, 1];
+
+/// Texels of the shares of the sky before a distance: azimuth, angle, distance (as in passes/sky.wgsl).
+const SHARE_SIZE: [u32; 3] = [32, 64, 24];
 
 /// What the sky is made from: sun, air, where it is seen from, and where the clouds are that it lights.
 type Key = (params::Sun, params::Atmosphere, [f64; 3], [f32; 3]);
@@ -31,7 +33,7 @@ fn viewpoint(eye: DVec3, params: &Params) -> DVec3 {
 
 /// The sky on the GPU.
 pub(crate) struct Sky {
-    made: Baked<Key, (wgpu::TextureView, wgpu::Buffer)>,
+    made: Baked<Key, (wgpu::TextureView, wgpu::TextureView, wgpu::Buffer)>,
 }
 
 impl Sky {
@@ -39,23 +41,45 @@ impl Sky {
         Self { made: Baked::new() }
     }
 
-    pub fn run(&mut self, ctx: &mut Context<'_>, params: &Params, frame: &Frame, eye: DVec3) -> Result<Bindings<'_>> {
+    /// `air` holds what `transmittance` and `multiscatter` have baked.
+    pub fn run(
+        &mut self,
+        ctx: &mut Context<'_>,
+        params: &Params,
+        frame: &Frame,
+        eye: DVec3,
+        air: &Bindings<'_>,
+    ) -> Result<Bindings<'_>> {
         let layers = [params.clouds.base, params.clouds.top, params.high_clouds.altitude];
         let from = viewpoint(eye, params);
-        let key = (params.sun.clone(), params.atmosphere.clone(), from.to_array(), layers);
-        let (map, light) = self.made.get(key, || {
+        let key =
+            (params::Sun { visible: true, ..params.sun.clone() }, transmittance::air(params), from.to_array(), layers);
+        let (map, share, light) = self.made.get(key, || {
             ctx.uniforms.upload_frame(ctx.gpu, &Frame::new(&Camera::equirect(from)?, params, 0.0, [1, 1]));
-            let map = ctx.gpu.texture("sky", SIZE, 1);
-            bake_map(ctx, "sky", "sky_map_bake", &map)?;
+            let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
+            let map = view(&ctx.gpu.texture("sky", SIZE, 1));
+            let share = view(&ctx.gpu.texture_3d("air_share", SHARE_SIZE));
             let light = ctx.gpu.buffer("sky_light", 64);
-            let mut bindings = ctx.uniforms.bindings();
-            bindings.push(("sky_light", (&light).into()));
             let mut work = ctx.gpu.work();
-            work.dispatch(&*ctx.gpu.kernel("sky", "sky_light_bake", ctx.variant)?, &bindings, [64, 1, 1])?;
+            let [across, down, _] = SHARE_SIZE;
+            let bakes = [
+                ("sky_map_bake", ("map_out", (&map).into()), SIZE),
+                ("air_share_bake", ("volume_out", (&share).into()), [across, down, 1]),
+                ("sky_light_bake", ("sky_light", (&light).into()), [1; 3]),
+            ];
+            for (entry, out, size) in bakes {
+                let bindings = [ctx.uniforms.bindings().as_slice(), air, &[out]].concat();
+                work.dispatch(&*ctx.gpu.kernel("sky", entry, ctx.variant)?, &bindings, size)?;
+            }
             work.submit(ctx.timings, ctx.interrupt)?;
             ctx.uniforms.upload_frame(ctx.gpu, frame);
-            Ok((map.create_view(&wgpu::TextureViewDescriptor::default()), light))
+            Ok((map, share, light))
         })?;
-        Ok(vec![("sky_map", map.into()), ("sky_light", light.into()), ("sky_light_uniform", light.into())])
+        Ok(vec![
+            ("sky_map", map.into()),
+            ("air_share", share.into()),
+            ("sky_light", light.into()),
+            ("sky_light_uniform", light.into()),
+        ])
     }
 }

@@ -1,0 +1,89 @@
+// The air between the eye and what it sees, and the light along a ray: both follow from the distance alone, and smoothly,
+// so that a ray works them out at four distances and not for every sample.
+#import atmosphere
+
+// The air along a ray, up to the ground or to space.
+struct Way {
+    start: f32, // where the ray enters the air, m
+    length: f32, // m from there
+    grounded: bool, // whether it ends on the ground
+}
+
+fn air_way(direction: vec3f) -> Way {
+    let air = hit_sphere(direction, frame.power_air);
+    let ground = hit_sphere(direction, frame.power_ground);
+    let end = select(air.far, ground.near, ground.enters);
+    return Way(air.near, select(0.0, max(end - air.near, 0.0), air.hit), ground.enters);
+}
+
+// Optical depth of the air between two distances on a ray from the eye, in so many pieces.
+fn aerial_depth(direction: vec3f, start: f32, end: f32, pieces: u32) -> vec3f {
+    var depth = vec3f(0.0);
+    var before = altitude_at(start * direction);
+    let piece = (end - start) / f32(pieces);
+    for (var i = 1u; i <= pieces; i++) {
+        let after = altitude_at((start + f32(i) * piece) * direction);
+        depth += air_depth_between(before, after, piece);
+        before = after;
+    }
+    return depth;
+}
+
+// The air before a distance: its transmittance, and the radiance that it adds.
+struct Air {
+    transmittance: vec3f,
+    radiance: vec3f,
+}
+
+// Pieces of the way to the first distance, and of the ways between them.
+const FIRST_PIECES = 4u;
+const PIECES = 2u;
+
+// The air before a distance on a ray, of a sky of so much radiance.
+fn air_before(direction: vec3f, distance: f32, way: Way, texel: vec2f, sky: vec3f) -> Air {
+    let start = min(way.start, distance);
+    let end = min(distance, way.start + way.length);
+    return air_of(aerial_depth(direction, start, end, FIRST_PIECES), distance, way, texel, sky);
+}
+
+fn air_of(depth: vec3f, distance: f32, way: Way, texel: vec2f, sky: vec3f) -> Air {
+    let amount = params.atmosphere.aerial_perspective;
+    let slices = f32(textureDimensions(air_share).z);
+    let root = sqrt(saturate((distance - way.start) / max(way.length, 1e-3)));
+    let at = vec3f(texel, (root * (slices - 1.0) + 0.5) / slices);
+    let share = saturate(textureSampleLevel(air_share, clamp_sampler, at, 0.0).rgb);
+    // So much more air hides so much more of the sky behind.
+    let scaled = select(1.0 - pow(1.0 - share, vec3f(amount)), share, amount == 1.0);
+    return Air(exp(-amount * depth), scaled * sky);
+}
+
+fn air_share_texel(direction: vec3f) -> vec2f {
+    return sky_texel(sky_coordinates(direction), vec2f(textureDimensions(air_share).xy));
+}
+
+// Four distances on a ray, the first where its clouds may begin and the last where they end: near ones lie closer together.
+struct Nodes {
+    start: f32,
+    length: f32,
+    bend: f32, // m from the start within which they are as good as evenly spread
+}
+
+// The air hides half of what is some tens of kilometres away.
+const NODE_BEND = 40000.0;
+
+fn ray_nodes(start: f32, length: f32) -> Nodes {
+    return Nodes(start, max(length, 1.0), NODE_BEND);
+}
+
+// The distance of a node.
+fn node_distance(nodes: Nodes, k: f32) -> f32 {
+    let x = k / 3.0;
+    return nodes.start + nodes.length * nodes.bend * x / (nodes.length + nodes.bend - nodes.length * x);
+}
+
+// Shares of a distance in the four nodes, by which what is worked out there is interpolated.
+fn node_shares(nodes: Nodes, distance: f32) -> vec4f {
+    let d = clamp(distance - nodes.start, 0.0, nodes.length);
+    let k = 3.0 * d * (nodes.length + nodes.bend) / (nodes.length * (d + nodes.bend));
+    return saturate(1.0 - abs(k - vec4f(0.0, 1.0, 2.0, 3.0)));
+}

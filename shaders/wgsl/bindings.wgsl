@@ -53,12 +53,12 @@ override LIGHT_CHEAP: bool = true; // there are light samples that do not
 @group(0) @binding(40) var sun_volume: texture_3d<f32>; // exp(-rate * optical depth to the sun) (passes/sun_volume)
 
 // The user's scene, a texel for each pixel of the sheet, row after row (scene_depth.wgsl).
-@group(0) @binding(60) var scene_depth: texture_2d<f32>; // m along the ray
-@group(0) @binding(61) var scene_color: texture_2d<f32>; // its radiance
+@group(0) @binding(70) var scene_depth: texture_2d<f32>; // m along the ray
+@group(0) @binding(71) var scene_color: texture_2d<f32>; // its radiance
 
 // Direct sun on the ground around the eye: levels in a stack, and, while they are baked, the mean of the last (passes/shadow).
-@group(0) @binding(62) var ground_shadow: texture_2d<f32>;
-@group(0) @binding(63) var ground_shadow_mean: texture_2d<f32>;
+@group(0) @binding(72) var ground_shadow: texture_2d<f32>;
+@group(0) @binding(73) var ground_shadow_mean: texture_2d<f32>;
 
 // One entry a pixel, row by row.
 @group(0) @binding(12) var<storage, read_write> clouds: array<vec4f>; // premultiplied radiance, transmittance

@@ -747,9 +747,20 @@ impl World {
 
         let blue_noise = vec![("blue_noise", (&self.blue_noise).into())];
         let uniforms = self.uniforms.bindings();
-        let mut bindings: Bindings<'_> =
-            [uniforms, noise.bindings(), weather, broad_weather, profile, phase, high_clouds, air, sky, volume, blue_noise]
-                .concat();
+        let mut bindings: Bindings<'_> = [
+            uniforms,
+            noise.bindings(),
+            weather,
+            broad_weather,
+            profile,
+            phase,
+            high_clouds,
+            air,
+            sky,
+            volume,
+            blue_noise,
+        ]
+        .concat();
         let majorants = self.majorants.run(&mut ctx, params, &bindings)?; // when paths are traced
         bindings.extend(majorants);
         let sun_volume = self.sun_volume.run(&mut ctx, params, frame, at, &bindings)?; // as clouds and eye move

@@ -45,7 +45,7 @@ pub(crate) struct Origin {
 impl Origin {
     /// The clouds move by `step` metres until the next.
     pub fn new(eye: DVec3, params: &Params, time: f64, step: f64) -> Self {
-        let period = step / fastest(params).max(0.1);
+        let period = step / fastest(params).max(0.125);
         let place = (eye.truncate() / EYE_STEP).round();
         let steps = [place.x as i64, place.y as i64, (time / period).floor() as i64];
         Self { steps, place: EYE_STEP * place, time: period * (time / period).floor() }

@@ -240,10 +240,10 @@ def test_what_sees_no_ground_bakes_nothing():
     assert not bakes(DOWN, **{"atmosphere.ground_shadows": False})
     assert not bakes(DOWN, **{"clouds.coverage": 0.0})
     assert bakes(DOWN)
-    assert not bakes(DOWN, time=1.24)  # 25 m / 20 m/s: every 1.25 s
-    assert bakes(DOWN, time=1.26)
-    assert not bakes(DOWN, time=1.26)
-    assert bakes(DOWN, time=1.26, **{"sun.azimuth": 10.0})
+    assert not bakes(DOWN, time=1.59)  # 32 m / 20 m/s: every 1.6 s
+    assert bakes(DOWN, time=1.61)
+    assert not bakes(DOWN, time=1.61)
+    assert bakes(DOWN, time=1.61, **{"sun.azimuth": 10.0})
 
 
 def test_pictures_do_not_depend_on_those_before():

@@ -23,6 +23,10 @@ const LEVELS: u32 = 5;
 const TEXEL: f32 = 64.0;
 const TEXEL_ALTITUDE: f32 = 12_000.0;
 
+/// The clouds may move so far while the shadows stay, m: half a texel, and a power of two, so that where winds have come
+/// round after times that are powers of two, shadows have too.
+const CLOUD_STEP: f64 = 32.0;
+
 /// What the shadows are made from: whether they are wanted, sun, clouds, weather, wind, planet and grid, and for where, how
 /// fine and when.
 type Key = (
@@ -43,7 +47,7 @@ pub(crate) struct GroundShadow {
 
 /// From where and when a picture's shadows are baked: the user's grid stays where it is.
 fn origin(eye: DVec3, params: &Params, time: f64) -> Origin {
-    Origin::new(eye, params, if params.volume.is_some() { 0.0 } else { time })
+    Origin::new(eye, params, if params.volume.is_some() { 0.0 } else { time }, CLOUD_STEP)
 }
 
 /// Where the eye is in the levels of its picture.

@@ -43,8 +43,9 @@ pub(crate) struct Origin {
 }
 
 impl Origin {
-    pub fn new(eye: DVec3, params: &Params, time: f64) -> Self {
-        let period = CLOUD_STEP / fastest(params).max(0.1);
+    /// The clouds move by `step` metres until the next.
+    pub fn new(eye: DVec3, params: &Params, time: f64, step: f64) -> Self {
+        let period = step / fastest(params).max(0.125);
         let place = (eye.truncate() / EYE_STEP).round();
         let steps = [place.x as i64, place.y as i64, (time / period).floor() as i64];
         Self { steps, place: EYE_STEP * place, time: period * (time / period).floor() }
@@ -53,7 +54,7 @@ impl Origin {
 
 /// Where the eye is in the volume of its picture.
 pub(crate) fn eye_in(eye: DVec3, params: &Params, time: f64) -> [f32; 2] {
-    let origin = Origin::new(eye, params, time);
+    let origin = Origin::new(eye, params, time, CLOUD_STEP);
     let drift = Carried::new(params, origin.time, time).drift();
     (eye.truncate() - origin.place - drift.truncate()).as_vec2().to_array()
 }
@@ -79,7 +80,7 @@ impl SunVolume {
         world: &Bindings<'_>,
     ) -> Result<Bindings<'_>> {
         let wanted = ctx.variant.sun_volume;
-        let origin = Origin::new(eye, params, time);
+        let origin = Origin::new(eye, params, time, CLOUD_STEP);
         let sun = [params.sun.elevation, params.sun.azimuth];
         let radius = params.atmosphere.planet_radius;
         let clouds = (params.clouds.clone(), params.upper_clouds.clone());

@@ -377,5 +377,5 @@ def test_light_through_a_deck(depth):
         mu = np.clip(np.where(inside, mu * turned + sine * np.cos(angle), mu), -1, 1)
     through = np.mean(z >= depth)
     clouds = nubis.Params().clouds
-    extinction = depth / (0.3 * (clouds.top - clouds.base))
+    extinction = depth / (0.12 * (clouds.top - clouds.base))
     assert share(0.0, {"clouds.extinction": extinction})[0] == pytest.approx(through, rel=0.25)

@@ -262,7 +262,7 @@ fn radiance_through_air(sum: Gathered, nodes: Nodes, direction: vec3f) -> vec3f 
         let mu = cos_zenith_at(p, frame.sun_direction);
         var light = sum.sun[k] * sun_irradiance(h, mu);
         if MODEL != MODEL_SINGLE {
-            light += sum.above[k] * ambient_above(params.sun.irradiance * sky_from_above(h, mu));
+            light += sum.above[k] * ambient_above(clouded_sky(params.sun.irradiance * sky_from_above(h, mu)));
             light += (sum.weight[k] - sum.above[k]) * ambient_below(lit_ground * sky_from_below(h, mu));
         }
         radiance += air.transmittance * light + sum.weight[k] * air.radiance;

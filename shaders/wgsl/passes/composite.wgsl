@@ -129,6 +129,10 @@ fn composite(@builtin(global_invocation_id) id: vec3u) {
     }
 }
 
+// Share of the sun that the clouds in its way scatter on to the ground: that of stratus (Haurwitz 1948: stratus 0.25,
+// stratocumulus 0.35, nimbostratus 0.18 of a clear sky). Without it the ground under overcast is lit by blue sky alone.
+const PASSED_ON = 0.25;
+
 // The ground without the sun that clouds keep from it.
 fn ground_in_shadow(lit: vec3f, p: vec3f) -> vec3f {
     let mu = cos_zenith_at(p, frame.sun_direction);
@@ -141,7 +145,7 @@ fn ground_in_shadow(lit: vec3f, p: vec3f) -> vec3f {
     }
     // As in `ground_radiance`.
     let direct = sun_irradiance(0.0, mu) * max(mu, 0.0);
-    return max(lit - (1.0 - sun) * params.atmosphere.ground_albedo / PI * direct, vec3f(0.0));
+    return max(lit - (1.0 - PASSED_ON) * (1.0 - sun) * params.atmosphere.ground_albedo / PI * direct, vec3f(0.0));
 }
 
 fn ground_seen(p: vec3f) -> vec3f {

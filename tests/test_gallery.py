@@ -1,4 +1,6 @@
-"""docs/clouds.md tells the truth: its lines run, and each block of them has its picture."""
+"""docs/clouds.md and docs/light.md tell the truth: their lines run, and each block of them has its
+picture.
+"""
 
 import re
 
@@ -8,16 +10,14 @@ import pytest
 import nubis
 from docs import gallery
 
-TEXT = gallery.PAGE.read_text(encoding="utf-8")
-PICTURES = gallery.pictures(TEXT)
+PICTURES = [p for page in gallery.PAGES for p in gallery.pictures(gallery.read(page), page)]
 
 
 @pytest.mark.parametrize("picture", PICTURES, ids=lambda picture: picture.name)
-def test_lines_make_a_picture(renderer, picture):
-    camera, params, time, exposure, _ = picture.shot()
-    frame = renderer(32, 18).render(camera, params, time=time)
+def test_lines_make_a_picture(picture):
+    frame = picture.shot().frame((32, 18), "draft")
     assert np.isfinite(frame).all() and frame[..., :3].max() > 0
-    assert nubis.to_srgb8(frame, exposure=exposure).std() > 5  # something is to be seen
+    assert nubis.to_srgb8(frame).std() > 5  # something is to be seen
 
 
 def test_no_two_blocks_make_the_same_picture(renderer):
@@ -26,14 +26,16 @@ def test_no_two_blocks_make_the_same_picture(renderer):
     assert len(frames) == len(PICTURES)
 
 
-def test_every_block_has_its_picture():
-    assert len(PICTURES) == len(re.findall(r"^```python$", TEXT, re.M)) >= 8
-    links = re.findall(r"!\[[^\]]*\]\(([^)]+)\)", TEXT)
-    assert links == [f"{gallery.FOLDER}/{picture.name}.png" for picture in PICTURES]
-    for picture in PICTURES:
+@pytest.mark.parametrize("page", gallery.PAGES)
+def test_every_block_has_its_picture(page):
+    text, pictures = gallery.read(page), [p for p in PICTURES if p.page == page]
+    assert len(pictures) == len(re.findall(r"^```python$", text, re.M)) >= 8
+    links = re.findall(r"!\[[^\]]*\]\(([^)]+)\)", text)
+    assert links == [f"{gallery.folder(page)}/{picture.name}.png" for picture in pictures]
+    for picture in pictures:
         assert picture.path.read_bytes().startswith(b"\x89PNG"), f"make gallery: {picture.name}"
-    kept = {path.name for path in (gallery.PAGE.parent / gallery.FOLDER).iterdir()}
-    assert kept == {picture.path.name for picture in PICTURES}
+    kept = {path.name for path in (gallery.DOCS / gallery.folder(page)).iterdir()}
+    assert kept == {picture.path.name for picture in pictures}
 
 
 LINES = "```python\ncamera, params = nubis.scenes['above']\n```\n"
@@ -43,10 +45,10 @@ LINK = "\n![Above](images/clouds/above.png)\n"
 def test_the_page_is_read():
     (one,) = gallery.pictures("# Page\n\n" + LINES + LINK)
     assert (one.name, one.line) == ("above", 4)
-    assert one.shot() == (*nubis.scenes["above"], 0.0, 0.0, None)
+    assert one.shot() == (*nubis.scenes["above"], 0.0, 0.0, None, None)
     timed = LINES.replace("\n```\n", "\ntime, exposure = 5.0, 1.5\n```\n")
     (one,) = gallery.pictures(timed + LINK)
-    assert one.shot()[2:] == (5.0, 1.5, None)
+    assert one.shot()[2:] == (5.0, 1.5, None, None)
 
 
 @pytest.mark.parametrize(

@@ -44,7 +44,7 @@ def test_transmittance_of_points(rng, scene):
     "scene, most", [("fair_weather", 0.10), ("overcast", 0.12), ("storm", 0.33)]
 )
 def test_on_is_off(scene, most):
-    """Against 32 live samples: what three samples and the volume err by, as a share of all light."""
+    """Against 32 live samples: the errors of three samples and the volume, of all light."""
     best = rendered(scene, LIVE.replace(light_steps=32))
     baked = rendered(scene, BAKED)
     seen = best["transmittance"] < 0.999

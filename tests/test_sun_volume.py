@@ -41,10 +41,10 @@ def test_transmittance_of_points(rng, scene):
 
 
 @pytest.mark.parametrize(
-    "scene, most", [("fair_weather", 0.10), ("overcast", 0.10), ("storm", 0.30)]
+    "scene, most", [("fair_weather", 0.10), ("overcast", 0.12), ("storm", 0.33)]
 )
 def test_on_is_off(scene, most):
-    """Against 32 live samples: what three samples and the volume err by."""
+    """Against 32 live samples: the errors of three samples and the volume, of all light."""
     best = rendered(scene, LIVE.replace(light_steps=32))
     baked = rendered(scene, BAKED)
     seen = best["transmittance"] < 0.999

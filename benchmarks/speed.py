@@ -144,6 +144,13 @@ def _pairs() -> Iterator[tuple[str, str, Row, Row]]:
         bare | {"clouds.coverage": 0.365},
         bare | {"clouds.coverage": 0.9},
     )
+    # What a picture has, and what it costs when it is switched off.
+    yield "without air", "fair_weather", {"atmosphere.enabled": False}, {}
+    yield "without shadows on the ground", "fair_weather", {"atmosphere.ground_shadows": False}, {}
+    yield "without high clouds", "fair_weather", bare, {}
+    yield "without the larger weather map", "fair_weather", {"weather.broad_variety": 0.0}, {}
+    yield "without the second deck", "two_decks", {"upper_clouds.coverage": 0.0}, {}
+    yield "without rain in sight", "storm", {"clouds.rain_extinction": 0.0}, {}
 
 
 def growth(repeats: int) -> list[Row]:

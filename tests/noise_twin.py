@@ -596,7 +596,9 @@ class Field:
         upright, (coverage, _, rain) = self.weather(points, altitude)
         share = altitude / f32(clouds.base)
         limit = np.where(altitude > 0, np.clip(2 * rain * coverage - 0.6 + 0.6 * share, 0, 1), 0)
-        at = self.carried(upright, altitude / 12, (wind.direction, wind.speed))
+        # They fall at 7.4 m/s; what is far up now is here later.
+        above = (altitude + 7.4 * self.time) / 12
+        at = self.carried(upright, above, (wind.direction, wind.speed))
         noise = sample(self.textures["shape_noise"], SHAPE_SIZE, at / f32(clouds.shape_scale))
         return limit, limit * np.clip(twin.remap(base_shape(noise), 0.15, 0.65), 0, 1)
 

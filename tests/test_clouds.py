@@ -200,6 +200,27 @@ def test_rain_falls_below_the_clouds(renderer, rng):
     assert (density_by_height(renderer, rng, hidden, heights, n=500, reach=2500.0) == 0).all()
 
 
+def test_rain_falls(renderer, rng):
+    """At 7.4 m/s where no wind blows: what was here is below a minute later, and another streak is
+    here in time.
+    """
+    still = {f"wind.{kind}speed": 0.0 for kind in ("", "detail_", "weather_")} | {
+        "wind.updraft": 0.0
+    }
+    params = storm_params(**{"clouds.rain_extinction": 0.002, **still})
+    points = rng.uniform((-2000, -2000, 650), (2000, 2000, 1150), (2000, 3))
+    seconds = 60.0
+    before = renderer().density(points, params)
+    below = renderer().density(points - [0, 0, 7.4 * seconds], params, time=seconds)
+    # Only that it thins out on its way, by at most a third.
+    wet = before > 1e-4
+    assert wet.mean() > 0.3
+    assert np.corrcoef(before[wet], below[wet])[0, 1] > 0.95
+    # Streaks are kilometres long.
+    same_place = renderer().density(points, params, time=1500.0)
+    assert np.corrcoef(before[wet], same_place[wet])[0, 1] < 0.8
+
+
 def test_rain_darkens_the_base(renderer):
     """nubis2015: the absorption gain, of the same cloud."""
     camera = nubis.Camera.look_at((0, 0, 100), (0, 300, 1000), (0, 1, 0), 60.0)

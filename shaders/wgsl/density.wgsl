@@ -36,8 +36,8 @@ fn weather_from_map(texel: vec3f) -> LocalWeather {
     let rain = texel.b * params.clouds.precipitation;
     let shifted = saturate(texel.r + 2.0 * params.clouds.coverage - 1.0);
     let kind = saturate(texel.g + 2.0 * params.clouds.type_ - 1.0);
-    // Where it rains, coverage is at least 0.7 and the type is pushed toward cumulonimbus (nubis2015), but a clear
-    // sky stays clear.
+    // Where it rains, coverage is at least 0.7 (nubis2015; here 0.95, so that towers have no holes) and the type is pushed
+    // toward cumulonimbus, but a clear sky stays clear.
     let wet = 0.95 * rain * saturate(5.0 * params.clouds.coverage);
     return LocalWeather(max(shifted, wet), mix(kind, 1.0, rain), rain);
 }
@@ -232,7 +232,7 @@ fn upper_cloud_at(p: vec3f, altitude: f32, broad: vec4f) -> Column {
     return with_extent(column, kind, 0.0, params.upper_clouds.top - base);
 }
 
-// Streaks are so many times longer than wide.
+// Streaks are so many times longer than wide (as in frame.rs).
 const RAIN_STRETCH = 12.0;
 
 // Rain below the base, thinned by the air that it falls through.
@@ -240,7 +240,7 @@ fn rain_below(weather: LocalWeather, at: vec2f, altitude: f32) -> Column {
     let height = altitude / params.clouds.base;
     let wet = weather.precipitation * weather.coverage;
     let limit = select(0.0, saturate(2.0 * wet - 0.6 + 0.6 * height), altitude > 0.0);
-    let streak = vec3f(at, altitude / RAIN_STRETCH);
+    let streak = vec3f(at, altitude / RAIN_STRETCH + frame.rain_fall);
     // All of the cloud is above it.
     let thickness = cloud_top(weather.precipitation) - params.clouds.base;
     return Column(limit, 1.0, 1.0, 0.0, weather.precipitation, streak, RAIN, thickness, 0.0);

@@ -171,6 +171,8 @@ params! {
         broad_bend: f32 = 0.0;
         /// How much longer at most a way in the smaller map becomes by that.
         broad_stretch: f32 = 0.0;
+        /// How far the rain has fallen, in the noise, which is squeezed along its streaks, m.
+        rain_fall: f32 = 0.0;
         /// Unit vector toward which the upper deck's wind blows.
         upper_direction: [f32; 2] = [0.0, 1.0];
         /// As `shape_origin`, for the upper deck.
@@ -218,6 +220,11 @@ const HIGH_LOW_SUN: f64 = 0.342;
 
 /// What the sun's half width, 0.005 as in atmosphere.wgsl, and f32 may add to its height, radians.
 const HALF_SUN: f64 = 0.006;
+
+/// Speed of falling rain, m/s: of drops of 2.5 mm (Gunn and Kinzer 1949).
+const RAIN_SPEED: f64 = 7.4;
+/// How many times longer than wide its streaks are (as in density.wgsl).
+const RAIN_STRETCH: f64 = 12.0;
 
 /// Altitude where the air ends, m (Hillaire 2020).
 const AIR_TOP: f64 = 100_000.0;
@@ -480,6 +487,8 @@ impl Frame {
         self.broad_bend = broad_weather::BEND * shares.bend * self.broad_scale;
         let ways = f64::from(broad_weather::BEND * params.weather.extent / params.weather.broad_extent);
         self.broad_stretch = (ways * broad_weather::STEEPEST) as f32;
+        let fallen = RAIN_SPEED * time / RAIN_STRETCH;
+        self.rain_fall = wrap(fallen, clouds.shape_scale) * clouds.shape_scale;
         self.set_upper_wind(eye, params, &carried);
 
         let (spot, radius) = params.clear_spot();

@@ -199,7 +199,8 @@ def test_shadows_of_a_grid():
         ratio = (seen_ground(DOWN, params, time) / seen_ground(DOWN, params, time, **off)).mean(
             axis=1
         )
-        assert ratio[under].max() < 0.4 and ratio[beside].min() > 0.999
+        # Skylight, and the quarter of the sun that the cloud passes on.
+        assert ratio[under].max() < 0.5 and ratio[beside].min() > 0.999
 
 
 def test_switched_off_nothing_is_kept_from_the_ground():

@@ -57,7 +57,7 @@ def test_no_room_for_a_deck():
     """Between a sky whose clouds reach as high as any may and one with a deck there is none yet."""
     deck = {"upper_clouds.coverage": 0.5, "upper_clouds.base": 6000.0, "upper_clouds.top": 7000.0}
     high, low = Params().with_(**{"clouds.top": 25_000.0}), Params().with_(**deck)
-    assert lerp(high, low, 1e-6).upper_clouds.coverage == 0
+    assert lerp(high, low, 1e-9).upper_clouds.coverage == 0
     sky = lerp(high, low, 0.1)
     assert sky.upper_clouds.coverage == pytest.approx(0.05)
     assert sky.upper_clouds.base >= sky.clouds.top

@@ -52,10 +52,11 @@ def write_speed(folder: Path, page: Path = SPEED) -> None:
         blocks["profile"] = _about(found["header"]) + _load(found) + "\n\n" + profile(found)
         blocks["memory"] = memory(found)
     if (found := _read(folder, "speed.json")) is not None:
-        blocks["against the published"] = _about(found["header"]) + "\n\n" + _against(found)
-        blocks["content"] = _content(found["content"])
-        blocks["growth"] = _growth(found["growth"])
-        blocks["animation"] = _animation(found)
+        about = {part: _about(header) + "\n\n" for part, header in found["headers"].items()}
+        blocks["against the published"] = about["published"] + _against(found)
+        blocks["content"] = about["content"] + _content(found["content"])
+        blocks["growth"] = about["growth"] + _growth(found["growth"])
+        blocks["animation"] = about["animation"] + _animation(found)
     if (heat := _read(folder, "heat.json")) is not None:
         blocks["heat"] = _heat(heat) + "\n\n" + _image(folder, page, "heat")
     page.write_text(_filled(page.read_text(), blocks))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from time import perf_counter, process_time
 from typing import Any
@@ -202,40 +202,52 @@ def _difference(frame: npt.NDArray[Any], still: npt.NDArray[Any]) -> float:
     return float(np.sqrt(np.mean(error**2)) / still[..., :3].mean())
 
 
-def run(size: Size, repeats: int, *, quick: bool = False) -> Row:
-    """All of it."""
-    compared = presets(size, repeats)
-    large = (160, 90) if quick else (1920, 1080)
-    anchor = (96, 54) if quick else (960, 540)
-    return {
-        "presets": compared,
-        "ratios": ratios(compared),
-        "content": content(size, repeats),
-        "growth": [] if quick else growth(repeats),
-        "animation": [
+#: What is measured, each with tables of its own in docs/speed.md.
+PARTS = "published", "content", "growth", "animation"
+
+
+def run(size: Size, repeats: int, parts: Sequence[str] = PARTS, *, quick: bool = False) -> Row:
+    """All of it, or some parts."""
+    found: Row = {}
+    if "published" in parts:
+        found["presets"] = presets(size, repeats)
+        found["ratios"] = ratios(found["presets"])
+    if "content" in parts:
+        found["content"] = content(size, repeats)
+    if "growth" in parts:
+        found["growth"] = [] if quick else growth(repeats)
+    if "animation" in parts:
+        large = (160, 90) if quick else (1920, 1080)
+        anchor = (96, 54) if quick else (960, 540)
+        found["animation"] = [
             animation("fair_weather", large, quality) for quality in ("draft", "balanced")
-        ],
-        "anchors": [
+        ]
+        found["anchors"] = [
             {"still": still(anchor, OURS["draft"], *nubis.scenes[scene], repeats)}
             | animation(scene, anchor, "draft")
             for scene in ANCHORS
-        ],
-    }
+        ]
+    return found
 
 
 def main() -> None:
-    """Measure, and write benchmarks/results/speed.json."""
+    """Measure, and write benchmarks/results/speed.json: what is new in place of what was."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.speed", description=__doc__)
     parser.add_argument("--size", default="1280x720", metavar="WxH")
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--quick", action="store_true", help="smaller animations")
+    parser.add_argument("--only", nargs="+", choices=PARTS, default=PARTS, help="some parts")
     parser.add_argument("--out", type=Path, default=RESULTS / "speed.json")
     args = parser.parse_args()
     width, height = (int(n) for n in args.size.split("x"))
     command = ["benchmarks.speed", "--size", args.size, "--repeats", str(args.repeats)]
+    if args.only != PARTS:
+        command += ["--only", *args.only]
     header = measure.header(command) | {"size": (width, height), "repeats": args.repeats}
-    found = run((width, height), args.repeats, quick=args.quick)
-    args.out.write_text(json.dumps({"header": header} | found, indent=1) + "\n")
+    kept = json.loads(args.out.read_text()) if args.out.exists() else {"headers": {}}
+    kept |= run((width, height), args.repeats, args.only, quick=args.quick)
+    kept["headers"] |= dict.fromkeys(args.only, header)
+    args.out.write_text(json.dumps(kept, indent=1) + "\n")
     if args.out.parent.resolve() == RESULTS:
         page.write_speed(RESULTS)
 

@@ -127,7 +127,7 @@ def _growth(rows: list[Row]) -> str:
 
 
 def _animation(found: Row) -> str:
-    cores = found["header"]["cores"]
+    cores = found["headers"]["animation"]["cores"]
     lines = []
     for row in [*found["animation"], *found["anchors"]]:
         still = f"{row['still']['seconds']:.2f}" if "still" in row else "–"

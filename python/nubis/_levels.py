@@ -44,7 +44,6 @@ def _make() -> dict[str, Params]:
             "clouds.coverage": 0.55,
             "clouds.precipitation": 0.9,
             "clouds.base": 900.0,
-            "clouds.rain_extinction": 2e-4,
         },
         "two_decks": {
             "clouds.coverage": 0.42,

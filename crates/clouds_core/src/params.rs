@@ -550,12 +550,17 @@ impl Params {
         self.volume.is_none() && self.broad_shares().total > 0.0
     }
 
+    /// The weathers of a mixture, or the one, and their weights, which are 1 together.
+    fn weathers(&self) -> impl Iterator<Item = (&Weather, f32)> {
+        let mixed: f32 = self.weather_mix.iter().map(|(_, share)| share).sum();
+        let others = self.weather_mix.iter().map(|(weather, share)| (weather, *share));
+        std::iter::once((&self.weather, (1.0 - mixed).max(0.0))).chain(others)
+    }
+
     /// The spot to keep clear, its middle and its radius in m: of a mixture one that grows in its place.
     pub fn clear_spot(&self) -> ([f64; 2], f64) {
-        let mixed: f32 = self.weather_mix.iter().map(|(_, share)| share).sum();
-        let all = self.weather_mix.iter().map(|(weather, share)| (weather, *share));
         let (mut middle, mut radius) = ([0.0; 2], 0.0);
-        for (weather, share) in std::iter::once((&self.weather, (1.0 - mixed).max(0.0))).chain(all) {
+        for (weather, share) in self.weathers() {
             let part = f64::from(share) * f64::from(weather.clear_radius);
             radius += part;
             for (sum, at) in middle.iter_mut().zip(weather.clear_at) {
@@ -567,11 +572,9 @@ impl Params {
 
     /// What the larger map is made of.
     pub fn broad_shares(&self) -> BroadShares {
-        let mixed: f32 = self.weather_mix.iter().map(|(_, share)| share).sum();
-        let all = self.weather_mix.iter().map(|(weather, share)| (weather, *share));
         let mut shares = BroadShares { maps: Vec::new(), total: 0.0, bend: 0.0 };
         let mut baked = 0.0;
-        for (weather, share) in std::iter::once((&self.weather, (1.0 - mixed).max(0.0))).chain(all) {
+        for (weather, share) in self.weathers() {
             let source = match (&weather.broad_map, &weather.map) {
                 (Some(map), _) => BroadSource::Own(map.clone()),
                 (None, None) => BroadSource::Seed(weather.seed),
@@ -613,10 +616,8 @@ impl Params {
 
     /// What the weather map is made of: maps by what they depend on, and their shares, which are 1 together.
     pub fn weather_shares(&self) -> Vec<(Weather, f32)> {
-        let mixed: f32 = self.weather_mix.iter().map(|(_, share)| share).sum();
         let mut shares: Vec<(Weather, f32)> = Vec::new();
-        let all = self.weather_mix.iter().map(|(weather, share)| (weather, *share));
-        for (weather, share) in std::iter::once((&self.weather, (1.0 - mixed).max(0.0))).chain(all) {
+        for (weather, share) in self.weathers() {
             let source = weather.source();
             match shares.iter_mut().find(|(known, _)| *known == source) {
                 Some((_, sum)) => *sum += share,

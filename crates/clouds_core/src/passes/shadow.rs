@@ -5,14 +5,14 @@ use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 
-use super::sun_volume::Origin;
+use super::sun_volume::{Origin, Shadows, shadows};
 use super::{Baked, Bindings, Context, Scene};
 use crate::camera::Camera;
 use crate::error::Result;
 use crate::frame::Frame;
 use crate::gpu::Gpu;
 use crate::kernel::{Variant, Wanted};
-use crate::params::{self, Params};
+use crate::params::Params;
 use crate::wind::Carried;
 
 /// Texels across a level, and levels (as in ground_shadow.wgsl).
@@ -29,16 +29,7 @@ const CLOUD_STEP: f64 = 32.0;
 
 /// What the shadows are made from: whether they are wanted, sun, clouds, weather, wind, planet and grid, and for where, how
 /// fine and when.
-type Key = (
-    bool,
-    [f32; 2],
-    (params::Clouds, params::UpperClouds),
-    (params::Weather, Vec<(params::Weather, f32)>),
-    (params::Wind, params::Wander),
-    (f32, usize),
-    [i64; 3],
-    f32,
-);
+type Key = (bool, Shadows, (f32, usize), [i64; 3], f32);
 
 /// The levels on the GPU.
 pub(crate) struct GroundShadow {
@@ -99,13 +90,9 @@ impl GroundShadow {
     ) -> Result<Bindings<'_>> {
         let wanted = wanted(frame);
         let origin = origin(eye, params, time);
-        let sun = [params.sun.elevation, params.sun.azimuth];
-        let clouds = (params.clouds.clone(), params.upper_clouds.clone());
-        let weather = (params.weather.clone(), params.weather_mix.clone());
-        let wind = (params.wind.clone(), params.wander.clone());
         let grid = params.volume.as_ref().map_or(0, |grid| Arc::as_ptr(grid) as usize);
         let planet = (params.atmosphere.planet_radius, grid);
-        let key = (wanted, sun, clouds, weather, wind, planet, origin.steps, frame.shadow_texel);
+        let key = (wanted, shadows(params), planet, origin.steps, frame.shadow_texel);
         let view = self.made.get(key, || {
             let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
             let size = if wanted { [SIDE, SIDE * LEVELS, 1] } else { [1; 3] };

@@ -20,15 +20,24 @@ const EYE_STEP: f64 = 600.0;
 const CLOUD_STEP: f64 = 25.0;
 
 /// What the light is made from: whether it is wanted, sun, clouds, weather, wind and planet, and from where and when.
-type Key = (
-    bool,
+type Key = (bool, Shadows, f32, [i64; 3]);
+
+/// What clouds cast shadows, and where: the sun's place, clouds, weather and wind.
+pub(crate) type Shadows = (
     [f32; 2],
     (params::Clouds, params::UpperClouds),
     (params::Weather, Vec<(params::Weather, f32)>),
     (params::Wind, params::Wander),
-    f32,
-    [i64; 3],
 );
+
+pub(crate) fn shadows(params: &Params) -> Shadows {
+    (
+        [params.sun.elevation, params.sun.azimuth],
+        (params.clouds.clone(), params.upper_clouds.clone()),
+        (params.weather.clone(), params.weather_mix.clone()),
+        (params.wind.clone(), params.wander.clone()),
+    )
+}
 
 /// The levels on the GPU.
 pub(crate) struct SunVolume {
@@ -81,12 +90,7 @@ impl SunVolume {
     ) -> Result<Bindings<'_>> {
         let wanted = ctx.variant.sun_volume;
         let origin = Origin::new(eye, params, time, CLOUD_STEP);
-        let sun = [params.sun.elevation, params.sun.azimuth];
-        let radius = params.atmosphere.planet_radius;
-        let clouds = (params.clouds.clone(), params.upper_clouds.clone());
-        let weather = (params.weather.clone(), params.weather_mix.clone());
-        let wind = (params.wind.clone(), params.wander.clone());
-        let key = (wanted, sun, clouds, weather, wind, radius, origin.steps);
+        let key = (wanted, shadows(params), params.atmosphere.planet_radius, origin.steps);
         let view = self.made.get(key, || {
             let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
             if !wanted {

@@ -459,6 +459,8 @@ class Atmosphere(Block):
         from 0 to 10.
     ground_shadows : bool
         Whether clouds cast shadows on the ground that is seen. Allowed: True or False.
+    beams : bool
+        Whether clouds cast shadows on the air: crepuscular rays. Allowed: True or False.
     ground_albedo : tuple[float, float, float]
         Albedo of the ground. Allowed: 3 numbers from 0 to 1.
     """
@@ -468,6 +470,7 @@ class Atmosphere(Block):
     haze: float = 1.0
     aerial_perspective: float = 1.0
     ground_shadows: bool = True
+    beams: bool = True
     ground_albedo: tuple[float, float, float] = (0.1, 0.12, 0.07)
 
 

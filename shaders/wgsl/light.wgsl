@@ -246,7 +246,7 @@ fn gathered_radiance(sum: Gathered, nodes: Nodes, direction: vec3f) -> vec3f {
 
 fn radiance_through_air(sum: Gathered, nodes: Nodes, direction: vec3f) -> vec3f {
     let way = air_way(direction);
-    let texel = air_share_texel(direction);
+    let texels = air_texels(direction);
     let sky = sky_radiance(direction);
     let lit_ground = ground_share() * params.sun.irradiance;
     var radiance = vec3f(0.0);
@@ -256,7 +256,7 @@ fn radiance_through_air(sum: Gathered, nodes: Nodes, direction: vec3f) -> vec3f 
         let distance = node_distance(nodes, f32(k));
         depth += aerial_depth(direction, before, distance, select(PIECES, FIRST_PIECES, k == 0u));
         before = distance;
-        let air = air_of(depth, distance, way, texel, sky);
+        let air = air_of(depth, distance, way, texels, sky);
         let p = distance * direction;
         let h = altitude_at(p);
         let mu = cos_zenith_at(p, frame.sun_direction);

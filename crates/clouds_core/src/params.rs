@@ -329,6 +329,8 @@ params! {
         aerial_perspective: f32 = 1.0, in 0..=10 "";
         /// Whether clouds cast shadows on the ground that is seen.
         ground_shadows: bool = true;
+        /// Whether clouds cast shadows on the air: crepuscular rays.
+        beams: bool = true;
         /// Albedo of the ground.
         ground_albedo: [f32; 3] = [0.10, 0.12, 0.07], in 0..=1 "";
     }

@@ -6,7 +6,7 @@ use crate::frame::Frame;
 use crate::kernel::{Variant, Wanted};
 
 /// Angle between rays in the middle of the picture, radians, most of them along a side, and slices of their distance.
-const ANGLE: f32 = 0.012;
+const ANGLE: f32 = 0.016;
 const MOST: u32 = 512;
 const SLICES: u32 = 32;
 

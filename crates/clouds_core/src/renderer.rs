@@ -106,7 +106,12 @@ impl Method {
         let bakes = high.into_iter().chain(BAKES).map(|(pass, entry)| (pass, entry, Variant::bake()));
         let composite = ("composite", "composite", composite::variant(variant, frame, layers));
         let clouds = clouds.iter().map(with(variant));
-        bakes.chain(shadow::kernels(frame, variant)).chain(beams::kernel(variant)).chain(clouds).chain([composite]).collect()
+        bakes
+            .chain(shadow::kernels(frame, variant))
+            .chain(beams::kernel(variant))
+            .chain(clouds)
+            .chain([composite])
+            .collect()
     }
 
     /// Whether there is nothing to march.

@@ -202,7 +202,7 @@ impl Renderer {
 
     /// What the last picture has left on the GPU: for whom, the variable of the shaders, and bytes.
     ///
-    /// The `scene` is what every picture reads, whatever its size; noises among it are shared by the renderers of a device.
+    /// The `scene` is what every picture reads, whatever its size, but for `beams`, which small ones have less of; noises among it are shared by the renderers of a device.
     /// A `still` and an `animation` have buffers of so many bytes a pixel.
     pub fn memory(&self) -> Vec<(&'static str, &'static str, u64)> {
         let mut held: Vec<_> = self.world.memory.iter().map(|&(name, bytes)| ("scene", name, bytes)).collect();

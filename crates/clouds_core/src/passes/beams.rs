@@ -5,9 +5,10 @@ use crate::error::Result;
 use crate::frame::Frame;
 use crate::kernel::{Variant, Wanted};
 
-/// Angle between rays in the middle of the picture, radians, most of them along a side, and slices of their distance.
+/// Angle between rays in the middle of the picture, radians, most of them along a side (393 go around a panorama), and slices
+/// of their distance.
 const ANGLE: f32 = 0.016;
-const MOST: u32 = 512;
+const MOST: u32 = 400;
 const SLICES: u32 = 32;
 
 /// The volume on the GPU, for pictures of one kind after another.

@@ -33,6 +33,11 @@ fn view_direction(pixel: vec2f) -> vec4f {
     return vec4f(normalize(direction), valid);
 }
 
+// The pixel that is marched for a cell of a subset. The last cells may hang over the edge; they march the edge.
+fn marched_pixel(cell: vec2u) -> vec2u {
+    return min(cell * frame.stride + vec2u(frame.subpixel_x, frame.subpixel_y), vec2u(frame.width, frame.height) - 1u);
+}
+
 // The pixel that a direction from the previous camera falls on, in the picture or not; z is 0 behind the camera.
 fn previous_pixel(direction: vec3f) -> vec3f {
     let size = vec2f(f32(frame.width), f32(frame.height));

@@ -228,6 +228,127 @@ def test_sheets_read_their_own_rows():
     assert np.allclose(frame[..., :3], color, rtol=1e-6)
 
 
+# Of an animation, pixels whose every ray is marched: the still is what they are compared with.
+EVERY = nubis.quality("draft").replace(contrast=0.0)
+CLOUDY = (
+    nubis.scenes["fair_weather"][0],
+    nubis.scenes["fair_weather"][1].with_(**{"clouds.coverage": 0.75, "high_clouds.coverage": 0.0}),
+)
+
+
+def ridge(size, shift):
+    """A jagged mountain 1500 m away, moved to the right by some pixels."""
+    y, x = np.mgrid[: size[1], : size[0]]
+    top = 0.35 * size[1] + 0.25 * size[1] * np.abs(np.mod((x - shift) / 37.0, 2) - 1)
+    return np.where(y > top, np.float32(1500.0), INF).astype(np.float32)
+
+
+def test_an_animation_of_a_scene_that_stands_still_becomes_the_still():
+    size = 96, 54
+    ours = nubis.Renderer(*size, quality="balanced")
+    depth, color = ridge(size, 0.0), np.full((54, 96, 4), 0.3, dtype=np.float32)
+    color[:27] *= 0.5
+    shot = (*CLOUDY, 0.0, depth, color)
+    still = ours.render(*CLOUDY, scene_depth=depth, scene_color=color)
+    first, *_, last = ours.animate([shot] * 32)
+    assert np.array_equal(first, still)
+    assert twin.relative_rmse(last, still) < 1e-3
+    assert twin.relative_rmse(ours.render(*CLOUDY), still) > 0.1
+
+
+@pytest.mark.parametrize("background", ["sky", None])
+def test_an_edge_that_moves_leaves_no_ghost(background):
+    """Where the scene of the frame before was another, the picture is the still's, to the bit."""
+    size = 120, 68
+    ours = nubis.Renderer(*size, quality=EVERY)
+    scenes = [ridge(size, 5.0 * i) for i in range(6)] + [None, None, ridge(size, 7.0)]
+    shots = [(*CLOUDY, 0.0, scene) for scene in scenes]
+    open_sky = np.full(size[::-1], INF)
+    for i, frame in enumerate(ours.animate(shots, background=background)):
+        still = ours.render(*CLOUDY, background=background, scene_depth=scenes[i])
+        if i == 0:
+            assert np.array_equal(frame, still)
+            continue
+        now, before = (open_sky if s is None else s for s in (scenes[i], scenes[i - 1]))
+        changed = now != before
+        assert changed.sum() > 100 or scenes[i] is None
+        assert np.array_equal(frame[changed], still[changed])
+        ghost = ours.render(*CLOUDY, background=background, scene_depth=scenes[i - 1])
+        if changed.any():
+            assert np.abs(ghost[changed] - still[changed]).max() > 0.2
+        # What has not changed is clamped to what is marched around it, here on a coarse lattice.
+        assert twin.relative_rmse(frame, still) < 0.1
+
+
+def flight(i, size):
+    """Over a plain behind which a mountain stands, past a pillar, as a rasterizer sees them."""
+    camera, params = CLOUDY
+    eye = np.array([12.0 * i, 8.0 * i, 600.0])
+    camera = nubis.Camera.look_at(eye, eye + np.array([0, 1000, 150]), (0, 0, 1), 50.0)
+    rays = twin.pixel_directions(camera, *size)
+    depth = np.full(size[::-1], np.inf)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        wall = (6000.0 - eye[1]) / rays[..., 1]
+        high = eye[2] + wall * rays[..., 2]
+        peak = 2600.0 - 0.8 * np.abs(eye[0] + wall * rays[..., 0])
+        depth = np.where((high > 0) & (high < peak), wall, depth)
+        near = (800.0 - eye[1]) / rays[..., 1]
+        pillar = np.abs(eye[0] + near * rays[..., 0] - 60.0) < 40.0
+    return camera, params, i / 24, np.where(pillar, near, depth).astype(np.float32)
+
+
+def test_a_flight_past_a_scene_is_as_near_the_stills_as_without():
+    """No farther from stills of the same shots than a flight without a scene, and not on the pixels
+    beside its edges, which are marched: there only the jitter of later rounds differs.
+    """
+    size = 160, 90
+    ours, other = (nubis.Renderer(*size, quality=EVERY.replace(jitter=False)) for _ in range(2))
+    shots = [flight(i, size) for i in range(20)]
+    errors, plain = [], []
+    bare = ours.animate([shot[:3] for shot in shots])
+    for shot, frame in zip(shots, list(bare), strict=True):
+        plain.append(twin.relative_rmse(frame, other.render(*shot[:2], time=shot[2])))
+    for i, (shot, frame) in enumerate(zip(shots, ours.animate(shots), strict=True)):
+        still = other.render(*shot[:2], time=shot[2], scene_depth=shot[3])
+        errors.append(twin.relative_rmse(frame, still))
+        edge = np.zeros(size[::-1], dtype=bool)
+        for axis in 0, 1:
+            step = np.diff(np.minimum(shot[3], 1e6), axis=axis) ** 2 > 1e6
+            edge[tuple(slice(0, n) for n in step.shape)] |= step
+        assert edge.sum() > 100
+        if i:
+            assert np.array_equal(frame[edge], still[edge])
+    assert max(errors) < 1.1 * max(plain)
+
+
+def test_animated_paths_end_at_the_scene():
+    """A static shot goes on tracing; another scene is another shot."""
+    params = CLOUDY[1].with_(**{"light.model": "path"})
+    quality = nubis.quality("balanced").replace(path_samples=4, path_scatterings=4)
+    ours = nubis.Renderer(32, 18, quality=quality)
+    one, other = ridge((32, 18), 0.0), ridge((32, 18), 5.0)
+    shots = [(CLOUDY[0], params, 0.0, scene) for scene in (one, one, other)]
+    first, second, third = ours.animate(shots)
+    assert np.array_equal(first, ours.render(CLOUDY[0], params, scene_depth=one))
+    assert not np.array_equal(first, second)
+    assert np.array_equal(third, ours.render(CLOUDY[0], params, scene_depth=other))
+
+
+def test_shots_with_a_bad_scene(renderer):
+    make = renderer(*SIZE)
+    shot = CAMERA, nubis.Params(), 0.0
+    for scene, message in [
+        ((np.zeros((3, 3)),), "scene_depth = array of shape"),
+        ((None, np.zeros((18, 32, 3))), "without scene_depth"),
+        ((np.ones((18, 32)), None, None), "it must be .camera, params, time., or with scene_depth"),
+    ]:
+        with pytest.raises(nubis.ParameterError, match=message):
+            list(make.animate([(*shot, *scene)]))
+    scene = np.ones((18, 32)), np.ones((18, 32, 3))
+    with pytest.raises(nubis.ParameterError, match="background"):
+        list(make.animate([(*shot, *scene)], background=None))
+
+
 def test_distance_from_z():
     """A plane across the axis is z away everywhere, and farther along rays to the corners."""
     z = np.full((36, 64), 1000.0)

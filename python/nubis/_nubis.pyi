@@ -191,7 +191,13 @@ class Renderer:
         """Clouds with alpha, sky, depth (-1 where there is none), density evaluations."""
 
     def animate(
-        self, camera: Camera, params: Params, time: float, background: bool
+        self,
+        camera: Camera,
+        params: Params,
+        time: float,
+        background: bool,
+        scene_depth: npt.NDArray[np.float32] | None,
+        scene_color: npt.NDArray[np.float32] | None,
     ) -> npt.NDArray[np.float32]: ...
     def cut(self) -> None: ...
     def density(

@@ -19,7 +19,11 @@ from nubis._shadow import ShadowMap, SunVisibility, seen_sun, world_from_map
 from nubis.params import Params, Quality
 
 Frame = npt.NDArray[np.float32]
-Shot = tuple[Camera, Params, float]
+Shot = (
+    tuple[Camera, Params, float]
+    | tuple[Camera, Params, float, npt.ArrayLike | None]
+    | tuple[Camera, Params, float, npt.ArrayLike | None, npt.ArrayLike | None]
+)
 Background = Literal["sky"] | None
 
 _warned = False
@@ -180,17 +184,30 @@ class Renderer:
         _check_camera(camera)
         _check_params(params)
         sky, when = _sky(background), _time(time)
+        return self._picture(self._core.render, camera, params, when, sky, scene_depth, scene_color)
+
+    def _picture(
+        self,
+        make: Callable[..., Frame],
+        camera: Camera,
+        params: Params,
+        time: float,
+        sky: bool,
+        scene_depth: npt.ArrayLike | None,
+        scene_color: npt.ArrayLike | None,
+    ) -> Frame:
+        """What `make` makes of a scene that may cover pixels in part."""
         scene = checked_scene(scene_depth, scene_color, self._size)
         if scene_color is not None and not sky:
             raise ParameterError('scene_color is not allowed with background=None: "sky" takes it')
         if scene is None:
-            return self._core.render(camera, params, when, sky, None, None)
-        frame: Frame = self._core.render(camera, params, when, sky, scene.depth, scene.color)
+            return make(camera, params, time, sky, None, None)
+        frame = make(camera, params, time, sky, scene.depth, scene.color)
         if scene.cover is not None:
             # Of the pixels that are covered in part, what lies behind; the others end at the eye.
             part = (scene.cover < 1) & np.isfinite(scene.depth)
             behind = np.where(part, np.float32(np.inf), np.float32(0))
-            rest = self._core.render(camera, params, when, sky, behind, None)
+            rest = self._core.render(camera, params, time, sky, behind, None)
             cover = scene.cover[part][:, None]
             frame[part] = cover * frame[part] + (1 - cover) * rest[part]
         return frame
@@ -261,7 +278,11 @@ class Renderer:
 
         Parameters
         ----------
-        shots : iterable of (Camera, Params, time in seconds)
+        shots : iterable of (Camera, Params, time in seconds[, scene_depth[, scene_color]])
+            The scene as for `render`, another in each shot or None. Beside its edges, and where it
+            was nearer or farther in the frame before, every pixel is marched: nothing of the past
+            is kept that another scene has hidden or shown. What pixels covered in part see behind
+            it is a still's.
         background : {"sky", None}
             As for `render`.
         progress : callable, optional
@@ -285,14 +306,18 @@ class Renderer:
         self._core.cut()
         for shot in shots:
             try:
-                camera, params, time = shot
+                camera, params, time, *scene = shot
+                scene_depth, scene_color = [*scene, None, None][: max(2, len(scene))]
             except Exception:  # whatever a class of its own raises
                 raise ParameterError(
-                    f"shot = {shot!r} is not allowed: it must be (camera, params, time)"
+                    f"shot = {shot!r} is not allowed: it must be (camera, params, time), or with "
+                    "scene_depth, or with scene_depth and scene_color"
                 ) from None
             _check_camera(camera)
             _check_params(params)
-            yield self._core.animate(camera, params, _time(time), sky)
+            yield self._picture(
+                self._core.animate, camera, params, _time(time), sky, scene_depth, scene_color
+            )
 
     def density(
         self, points: npt.ArrayLike, params: Params, *, time: float = 0.0

@@ -55,6 +55,7 @@ override LIGHT_CHEAP: bool = true; // there are light samples that do not
 
 // The user's scene, a texel for each pixel of the sheet, row after row (scene_depth.wgsl).
 @group(0) @binding(70) var scene_depth: texture_2d<f32>; // m along the ray
+@group(0) @binding(54) var scene_before: texture_2d<f32>; // m along the ray in the frame before (passes/reproject)
 @group(0) @binding(71) var scene_color: texture_2d<f32>; // its radiance
 
 // Direct sun on the ground around the eye: levels in a stack, and, while they are baked, the mean of the last (passes/shadow).

@@ -33,6 +33,11 @@ fn view_direction(pixel: vec2f) -> vec4f {
     return vec4f(normalize(direction), valid);
 }
 
+// The pixel that is marched for a cell of a subset. The last cells may hang over the edge; they march the edge.
+fn marched_pixel(cell: vec2u) -> vec2u {
+    return min(cell * frame.stride + vec2u(frame.subpixel_x, frame.subpixel_y), vec2u(frame.width, frame.height) - 1u);
+}
+
 // Where in the picture of a camera a direction falls, given as right, up and forward of that: from -1 to 1, right and up, or
 // beyond; z is 0 behind the camera.
 fn picture_place(local: vec3f, tan_half_fov: f32, half_fov: f32) -> vec3f {

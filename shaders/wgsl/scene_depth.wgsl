@@ -22,7 +22,11 @@ fn scene_radiance(pixel: vec2u) -> vec3f {
 }
 
 fn scene_texel(pixel: vec2u) -> vec2u {
-    let index = (pixel.y - frame.sheet_row) * frame.width + pixel.x;
+    return scene_texel_of((pixel.y - frame.sheet_row) * frame.width + pixel.x);
+}
+
+// The texel of the pixel with that number in the sheet.
+fn scene_texel_of(index: u32) -> vec2u {
     return vec2u(index % SCENE_ROW, index / SCENE_ROW);
 }
 

@@ -37,7 +37,7 @@ impl Scene {
     fn animate(&mut self) {
         self.time += 1.0 / 24.0;
         self.camera.eye.y += 1.0;
-        self.renderer.animate(&self.camera, &self.params, self.time, true, &|| Ok(())).expect("renders");
+        self.renderer.animate(&self.camera, &self.params, self.time, true, None, &|| Ok(())).expect("renders");
     }
 
     /// Asks for the density at one point, which bakes what is stale and marches nothing.

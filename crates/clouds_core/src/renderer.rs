@@ -27,7 +27,7 @@ use crate::passes::phase::PhaseTable;
 use crate::passes::profile::Profile;
 use crate::passes::rays::Rays;
 use crate::passes::refine::{COARSEST, Refined};
-use crate::passes::reproject::{ORDER, STRIDE};
+use crate::passes::reproject::{History, ORDER, STRIDE};
 use crate::passes::shadow::{self, GroundShadow};
 use crate::passes::sky::Sky;
 use crate::passes::sun_volume::SunVolume;
@@ -49,6 +49,7 @@ pub struct Renderer {
     animation: Option<Animation>,
     refining: Option<Refining>,
     march_pace: Pace,
+    reproject_pace: Pace,
     pixel_pace: Pace,
     shadow_pace: Pace,
     /// Milliseconds on the GPU by kernel, for the last picture or answer.
@@ -144,6 +145,8 @@ struct Refining {
     params: Params,
     time: f64,
     background: bool,
+    /// Distance and radiance of the user's scene.
+    scene: Option<(Vec<f32>, Option<Vec<f32>>)>,
     image: Vec<f32>,
     /// Stills that it is the mean of.
     count: u32,
@@ -156,6 +159,7 @@ struct Animation {
     before: Marched,
     now: Marched,
     composed: Composed,
+    scene_before: SceneTextures,
     last: Option<Shot>,
 }
 
@@ -164,6 +168,8 @@ struct Shot {
     params: Params,
     time: f64,
     frame: Frame,
+    /// Distance of the user's scene.
+    scene: Option<Vec<f32>>,
     /// Frames since the last cut.
     index: u32,
 }
@@ -190,6 +196,7 @@ impl Renderer {
             animation: None,
             refining: None,
             march_pace: pace,
+            reproject_pace: pace,
             pixel_pace: pace,
             // Its texels may take many times as long as a pixel's march.
             shadow_pace: Pace::new(if gpu.info.kind == "cpu" { 1e4 } else { 1e6 }),
@@ -213,8 +220,9 @@ impl Renderer {
             add("still", [marched.bindings(), refined.bindings(), composed.bindings()].concat());
             add("still", rays.as_ref().map_or(Vec::new(), |rays| rays.bindings("rays")));
         }
-        if let Some(Animation { refined, fresh, before, now, composed, .. }) = &self.animation {
+        if let Some(Animation { refined, fresh, before, now, composed, scene_before, .. }) = &self.animation {
             add("animation", [fresh.bindings(), refined.bindings(), composed.bindings()].concat());
+            add("animation", vec![("scene_before", scene_before.depth())]);
             add("animation", [before.bindings(), now.bindings()].concat());
         }
         held
@@ -354,6 +362,8 @@ impl Renderer {
     /// The next frame of an animation: a sixteenth of its pixels is marched, the others follow the clouds from the frame
     /// before. The first frame, and the first after a cut, is a still. Returns what [`Renderer::render`] does.
     ///
+    /// Beside edges of the user's scene, now or in the frame before, every pixel is marched.
+    ///
     /// Where rays converge or paths are traced, every frame is a still; a static shot goes on tracing.
     pub fn animate(
         &mut self,
@@ -361,12 +371,14 @@ impl Renderer {
         params: &Params,
         time: f64,
         background: bool,
+        scene_depth: Option<SceneDepth<'_>>,
         interrupt: Interrupt<'_>,
     ) -> Result<Vec<f32>> {
         if Method::new(params, &self.quality) != Method::March {
-            return self.refine(camera, params, time, background, interrupt);
+            return self.refine(camera, params, time, background, scene_depth, interrupt);
         }
         let (mut frame, params) = self.begin(camera, params, time)?;
+        scene_depth.map_or(Ok(()), |scene| scene.check(self.size))?;
         let params = &params;
         frame.background = u32::from(background);
         frame.ground_shadow = u32::from(background && frame.has_ground_shadow(camera, params));
@@ -374,8 +386,8 @@ impl Renderer {
         frame.cloudless = u32::from(Method::March.is_cloudless(params));
         let [width, height] = self.size;
         let pixels = u64::from(width) * u64::from(height);
-        if 16 * pixels > self.gpu.max_buffer {
-            let most = self.gpu.max_buffer / 16;
+        let most = (self.gpu.max_buffer / 16).min(scene_depth.map_or(u64::MAX, |_| SceneTextures::MOST_PIXELS));
+        if pixels > most {
             let size = format!("{width} x {height}");
             return Err(Error::parameter(
                 "width x height",
@@ -391,6 +403,7 @@ impl Renderer {
             before: Marched::new(gpu, pixels),
             now: Marched::new(gpu, pixels),
             composed: Composed::new(gpu, pixels),
+            scene_before: SceneTextures::new(gpu, 0, false),
             last: None,
         });
         // Taken out while the frame is in the making: if it fails, the next one starts anew.
@@ -398,9 +411,29 @@ impl Renderer {
         // A frame without clouds leaves no history.
         let last = last.filter(|last| last.frame.cloudless == frame.cloudless);
         let index = last.as_ref().map_or(0, |last| last.index + 1);
+        // Where a scene was and is no more, or is and was not, there is nothing.
+        let had = last.as_ref().and_then(|last| last.scene.as_deref());
+        let has = scene_depth.map(|scene| scene.distance);
+        if has.is_some() || had.is_some() {
+            let color = scene_depth.and_then(|scene| scene.color);
+            frame.scene = 1;
+            frame.scene_lit = u32::from(color.is_some());
+            if !world.scene_depth.holds(pixels, color.is_some()) {
+                world.scene_depth = SceneTextures::new(gpu, pixels, color.is_some());
+            }
+            if !animation.scene_before.holds(pixels, false) {
+                animation.scene_before = SceneTextures::new(gpu, pixels, false);
+            }
+            let nothing = vec![f32::INFINITY; pixels as usize];
+            let now = SceneDepth { distance: has.unwrap_or(&nothing), color };
+            let before = SceneDepth { distance: had.unwrap_or(&nothing), color: None };
+            world.scene_depth.upload(gpu, &now, 0..pixels as usize);
+            animation.scene_before.upload(gpu, &before, 0..pixels as usize);
+        }
         if let Some(last) = &last {
             frame.set_previous(&last.frame, camera.eye - last.camera.eye, &Carried::new(params, last.time, time));
             frame.moving = u32::from(last.camera != *camera || last.params != *params || last.time != time);
+            frame.moving |= u32::from(had != has);
         }
         // While anything moves, each round of the sixteen pixels moves the blue noise on by the golden ratio; a static
         // shot keeps the still's, and so becomes the still.
@@ -412,7 +445,7 @@ impl Renderer {
         })?;
 
         let mut ctx = Context { gpu, uniforms: scene.uniforms, variant: scene.variant, timings, interrupt };
-        let Animation { refined, fresh, before, now, composed, .. } = &*animation;
+        let Animation { refined, fresh, before, now, composed, scene_before, .. } = &*animation;
         if frame.cloudless > 0 {
             frame.sheet_rows = height;
         } else if last.is_none() {
@@ -425,12 +458,26 @@ impl Renderer {
             frame.sheet_rows = cells[1];
             march_sheet(&mut ctx, &scene, &mut frame, quality, &mut self.march_pace, refined, fresh)?;
         }
+        if last.is_some() && frame.cloudless == 0 {
+            let old = History { marched: before, scene: scene_before };
+            let mut rays = 0;
+            gpu.queue.write_buffer(&refined.count, 0, &[0; 4]);
+            in_bands(&mut self.reproject_pace, gpu, &scene, &mut frame, [width, height], |frame| {
+                let mut work = gpu.work();
+                reproject::run(gpu, &mut work, &scene, frame, fresh, &old, refined, now)?;
+                work.download(&refined.count, 0, 4);
+                rays = work.submit(timings, interrupt)?[0].numbers()[0];
+                Ok(())
+            })?;
+            // What the past says nothing about.
+            let mut frame = Frame { stride: 1, subpixel_x: 0, subpixel_y: 0, march_width: width, ..frame.clone() };
+            frame.spans = 0;
+            let mut ctx = Context { gpu, uniforms: scene.uniforms, variant: scene.variant, timings, interrupt };
+            march_listed(&mut ctx, &scene, &mut frame, rays, &mut self.march_pace, refined, now)?;
+        }
         let mut image = Vec::with_capacity(4 * pixels as usize);
         in_bands(&mut self.pixel_pace, gpu, &scene, &mut frame, [width, height], |frame| {
             let mut work = gpu.work();
-            if last.is_some() && frame.cloudless == 0 {
-                reproject::run(gpu, &mut work, &scene, frame, fresh, before, now)?;
-            }
             composite::run(gpu, &mut work, &scene, frame, now, composed, false)?;
             let (row, rows) = (u64::from(frame.first_row), u64::from(frame.rows));
             work.download(&composed.image, 16 * u64::from(width) * row, 16 * u64::from(width) * rows);
@@ -440,7 +487,8 @@ impl Renderer {
 
         gpu.pipelines.store();
         mem::swap(&mut animation.before, &mut animation.now);
-        animation.last = Some(Shot { camera: *camera, params: params.clone(), time, frame, index });
+        let seen = has.map(<[f32]>::to_vec);
+        animation.last = Some(Shot { camera: *camera, params: params.clone(), time, frame, scene: seen, index });
         Ok(image)
     }
 
@@ -451,10 +499,17 @@ impl Renderer {
         params: &Params,
         time: f64,
         background: bool,
+        scene_depth: Option<SceneDepth<'_>>,
         interrupt: Interrupt<'_>,
     ) -> Result<Vec<f32>> {
+        let seen = |last: &Refining| match (&last.scene, &scene_depth) {
+            (Some((distance, color)), Some(scene)) => *distance == scene.distance && color.as_deref() == scene.color,
+            (last, now) => last.is_none() && now.is_none(),
+        };
         let same = |last: &Refining| {
-            (last.camera, last.time, last.background) == (*camera, time, background) && last.params == *params
+            (last.camera, last.time, last.background) == (*camera, time, background)
+                && last.params == *params
+                && seen(last)
         };
         let last = self.refining.take().filter(same);
         let count = last.as_ref().map_or(0, |last| last.count);
@@ -463,7 +518,8 @@ impl Renderer {
             Some(last) if params.light.model != Model::Path => last.image,
             last => {
                 let first_sample = count.wrapping_mul(self.quality.path_samples);
-                let fresh = self.still(camera, params, time, background, false, first_sample, None, interrupt)?.image;
+                let fresh =
+                    self.still(camera, params, time, background, false, first_sample, scene_depth, interrupt)?.image;
                 let share = 1.0 / (count as f32 + 1.0);
                 match last {
                     Some(last) => last.image.iter().zip(&fresh).map(|(old, new)| old + share * (new - old)).collect(),
@@ -476,6 +532,7 @@ impl Renderer {
             params: params.clone(),
             time,
             background,
+            scene: scene_depth.map(|scene| (scene.distance.to_vec(), scene.color.map(<[f32]>::to_vec))),
             image: image.clone(),
             count: count + 1,
         };
@@ -889,17 +946,7 @@ fn march_sheet(
     frame.lattice = coarsest;
     let mut rays = refined.begin(gpu, &frame);
     loop {
-        frame.first_ray = 0;
-        while frame.first_ray < rays {
-            frame.active_rays = pace.pixels().min(rays - frame.first_ray);
-            scene.uniforms.upload_frame(gpu, &frame);
-            let started = Instant::now();
-            let mut work = gpu.work();
-            march::run_list(gpu, &mut work, scene, &frame, refined, out)?;
-            work.submit(ctx.timings, interrupt)?;
-            pace.learn(u64::from(frame.active_rays), started);
-            frame.first_ray += frame.active_rays;
-        }
+        march_listed(ctx, scene, &mut frame, rays, pace, refined, out)?;
         if frame.lattice == 1 {
             return Ok(());
         }
@@ -911,6 +958,30 @@ fn march_sheet(
         frame.lattice /= 2;
         frame.spans = 1;
     }
+}
+
+/// Marches the first `rays` pixels of a list.
+fn march_listed(
+    ctx: &mut Context<'_>,
+    scene: &Scene<'_>,
+    frame: &mut Frame,
+    rays: u32,
+    pace: &mut Pace,
+    refined: &Refined,
+    out: &Marched,
+) -> Result<()> {
+    frame.first_ray = 0;
+    while frame.first_ray < rays {
+        frame.active_rays = pace.pixels().min(rays - frame.first_ray);
+        scene.uniforms.upload_frame(ctx.gpu, frame);
+        let started = Instant::now();
+        let mut work = ctx.gpu.work();
+        march::run_list(ctx.gpu, &mut work, scene, frame, refined, out)?;
+        work.submit(ctx.timings, ctx.interrupt)?;
+        pace.learn(u64::from(frame.active_rays), started);
+        frame.first_ray += frame.active_rays;
+    }
+    Ok(())
 }
 
 /// How many pixels a second buys, from the bands so far.

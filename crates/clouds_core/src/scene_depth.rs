@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
+use crate::kernel::Binding;
 use crate::passes::Bindings;
 
 /// Distance of what is not there, m, and texels of a row (as in scene_depth.wgsl).
@@ -42,6 +43,9 @@ pub(crate) struct SceneTextures {
 }
 
 impl SceneTextures {
+    /// Most pixels of a sheet: textures have at least so many rows.
+    pub const MOST_PIXELS: u64 = 8192 * ROW as u64;
+
     /// For sheets of so many pixels; of none where there is no scene, as kernels that ask for none want something bound.
     pub fn new(gpu: &Gpu, pixels: u64, colored: bool) -> Self {
         let texture = |label, pixels: u64, format| {
@@ -74,7 +78,11 @@ impl SceneTextures {
         }
     }
 
+    pub fn depth(&self) -> Binding<'_> {
+        (&self.views[0]).into()
+    }
+
     pub fn bindings(&self) -> Bindings<'_> {
-        vec![("scene_depth", (&self.views[0]).into()), ("scene_color", (&self.views[1]).into())]
+        vec![("scene_depth", self.depth()), ("scene_color", (&self.views[1]).into())]
     }
 }

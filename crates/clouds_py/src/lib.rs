@@ -458,6 +458,7 @@ impl Renderer {
         (image, sky, depth, samples, uncertainty).into_pyobject(py)
     }
 
+    #[expect(clippy::too_many_arguments, reason = "what a frame depends on")]
     fn animate<'py>(
         &self,
         py: Python<'py>,
@@ -465,10 +466,13 @@ impl Renderer {
         params: &Bound<'_, PyAny>,
         time: f64,
         background: bool,
+        scene_depth: Option<PyReadonlyArrayDyn<'py, f32>>,
+        scene_color: Option<PyReadonlyArrayDyn<'py, f32>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let params: Params = params_from_python(params)?;
+        let scene = scene_from_python(scene_depth.as_ref(), scene_color.as_ref())?;
         let image =
-            detached(py, |interrupt| lock(&self.core).animate(&camera.0, &params, time, background, interrupt))?;
+            detached(py, |interrupt| lock(&self.core).animate(&camera.0, &params, time, background, scene, interrupt))?;
         array(py, image, &self.shape(&[4]))
     }
 

@@ -31,8 +31,7 @@ const NOWHERE = vec2f(1e30, 0.0);
 // Marches the ray of a cell of the sheet within a span, and returns the span of its clouds.
 fn march_cell(index: u32, within: vec2f) -> vec2f {
     let cell = vec2u(index % frame.march_width, frame.sheet_row + index / frame.march_width);
-    // The last cells of a subset may hang over the edge; they march the edge.
-    let pixel = min(cell * frame.stride + vec2u(frame.subpixel_x, frame.subpixel_y), vec2u(frame.width, frame.height) - 1u);
+    let pixel = marched_pixel(cell);
     let view = view_direction(vec2f(pixel) + 0.5);
     var cloud = Cloud(vec3f(0.0), 1.0, -1.0, NOWHERE);
     if view.w > 0.0 {

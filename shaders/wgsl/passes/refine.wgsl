@@ -4,6 +4,7 @@
 // that the finer lattice adds is put on the list of rays, or gets its value here. An invocation has a square of the
 // lattice: the pixel in its middle, and those of its upper and its left edge, which it shares with its neighbours.
 #import bindings
+#import camera
 #import scene_depth
 
 @compute @workgroup_size(8, 8)
@@ -59,7 +60,7 @@ fn read(pixel: vec2u) -> Known {
 }
 
 fn scene_at(pixel: vec2u) -> f32 {
-    return scene_distance(vec2u(pixel.x, frame.sheet_row + pixel.y));
+    return scene_distance(marched_pixel(vec2u(pixel.x, frame.sheet_row + pixel.y)));
 }
 
 fn mixed(a: Known, b: Known, share: f32) -> Known {

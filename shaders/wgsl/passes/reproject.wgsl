@@ -4,6 +4,7 @@
 #import bindings
 #import camera
 #import shell
+#import scene_depth
 
 // Pixels of a cell in each direction (as in reproject.rs).
 const STRIDE = 4;
@@ -11,6 +12,10 @@ const STRIDE = 4;
 // How many standard deviations of its neighbourhood a moving pixel may be from its mean. Measured on a pan: 1.25 blurs
 // (error 13.0 %), 2 keeps what 4 keeps (11.7 and 11.4 %) and still catches ghosts.
 const SPREAD = 2.0;
+
+// How many times as far as its nearest the user's scene may be around a cell, now and in the frame before. Past that
+// there is an edge, beside which neighbours and past say nothing of a pixel, as their rays have ended elsewhere.
+const SCENE_STEP = 1.1;
 
 // What the pixels of a cell have in common.
 struct Cell {
@@ -61,6 +66,7 @@ fn reproject(@builtin(global_invocation_id) id: vec3u) {
     // blur. What has moved by whole pixels reads them, exactly. Four rows at a time make one.
     let snapped = select(motion, round(motion), abs(motion - round(motion)) < vec2f(1e-3));
     let corner = cell.corner + vec2i(floor(snapped)) - 1;
+    let alone = SCENE && frame.moving > 0u && has_scene_edge(at, cell.corner, corner);
     let across = catmull_rom(snapped.x - floor(snapped.x));
     let down = catmull_rom(snapped.y - floor(snapped.y));
     var a = history_row(corner, across);
@@ -71,10 +77,10 @@ fn reproject(@builtin(global_invocation_id) id: vec3u) {
     loop {
         let d = history_row(corner + vec2i(0, y + 3), across);
         let old = a * down.x + b * down.y + c * down.z + d * down.w;
-        fill(cell, vec2i(0, y), old[0]);
-        fill(cell, vec2i(1, y), old[1]);
-        fill(cell, vec2i(2, y), old[2]);
-        fill(cell, vec2i(3, y), old[3]);
+        fill(cell, vec2i(0, y), old[0], alone);
+        fill(cell, vec2i(1, y), old[1], alone);
+        fill(cell, vec2i(2, y), old[2], alone);
+        fill(cell, vec2i(3, y), old[3], alone);
         if y == STRIDE - 1 {
             break;
         }
@@ -85,8 +91,8 @@ fn reproject(@builtin(global_invocation_id) id: vec3u) {
     }
 }
 
-// Fills a pixel of a cell, for what the frame before has in its place.
-fn fill(cell: Cell, place: vec2i, old: vec4f) {
+// Fills a pixel of a cell, for what the frame before has in its place; `alone`, it is marched instead.
+fn fill(cell: Cell, place: vec2i, old: vec4f, alone: bool) {
     let pixel = cell.corner + place;
     if pixel.x >= i32(frame.width) || pixel.y >= i32(frame.height) {
         return;
@@ -105,6 +111,9 @@ fn fill(cell: Cell, place: vec2i, old: vec4f) {
         value = select(clamp(old, cell.low, cell.high), old, frame.moving == 0u);
         value_depth = select(cell.distance, history_depth[pixel_index(pixel)], frame.moving == 0u);
     }
+    if SCENE && alone && !is_fresh {
+        active_rays[atomicAdd(&ray_count, 1u)] = pixel_index(pixel);
+    }
     if !is_finite4(value) {
         value = vec4f(0.0, 0.0, 0.0, 1.0);
     }
@@ -113,6 +122,38 @@ fn fill(cell: Cell, place: vec2i, old: vec4f) {
     // Thinner than f32 tells from nothing, a cloud may still shine from where it is.
     let clear = value.a >= 1.0 && all(value.rgb <= vec3f(0.0));
     cloud_depth[index] = select(max(value_depth, 0.0), -1.0, clear);
+}
+
+// Whether the scene has an edge among the pixels of a cell, the marched ones around it, and those of the past that are read.
+fn has_scene_edge(at: vec2i, corner: vec2i, past_corner: vec2i) -> bool {
+    let size = vec2i(i32(frame.march_width), i32((frame.height + frame.stride - 1u) / frame.stride));
+    var near = NO_SCENE;
+    var far = 0.0;
+    var i = 0;
+    loop {
+        // Seven by seven pixels of the past, of which the first four by four are the cell's own now, and the first three
+        // by three number its neighbours.
+        let place = vec2i(i % 7, i / 7);
+        let own = scene_now(corner + min(place, vec2i(STRIDE - 1)));
+        let neighbour = clamp(at + min(place, vec2i(2)) - 1, vec2i(0), size - 1);
+        let around = scene_distance(marched_pixel(vec2u(neighbour)));
+        let past = scene_past(past_corner + place);
+        near = min(near, min(own, min(around, past)));
+        far = max(far, max(own, max(around, past)));
+        if i == 48 {
+            break;
+        }
+        i++;
+    }
+    return far > SCENE_STEP * near;
+}
+
+fn scene_now(pixel: vec2i) -> f32 {
+    return textureLoad(scene_depth, scene_texel_of(pixel_index(pixel)), 0).r;
+}
+
+fn scene_past(pixel: vec2i) -> f32 {
+    return textureLoad(scene_before, scene_texel_of(pixel_index(pixel)), 0).r;
 }
 
 // The three marched pixels around a cell in its row.

@@ -2,9 +2,11 @@
 
 use super::Scene;
 use super::march::Marched;
+use super::refine::Refined;
 use crate::error::Result;
 use crate::frame::Frame;
 use crate::gpu::{Gpu, Work};
+use crate::scene_depth::SceneTextures;
 
 /// One of this many pixels is marched in a frame, in each direction.
 pub(crate) const STRIDE: u32 = 4;
@@ -30,23 +32,35 @@ pub(crate) const ORDER: [[u32; 2]; 16] = [
     [0, 3],
 ];
 
-/// Fills `out` from the `fresh` subset and from the frame `before`, for the band of `frame`.
+/// The frame before.
+pub(crate) struct History<'a> {
+    /// Its clouds.
+    pub marched: &'a Marched,
+    /// The user's scene in it.
+    pub scene: &'a SceneTextures,
+}
+
+/// Fills `out` from the `fresh` subset and from the frame `before`, for the band of `frame`; lists in `refined` the pixels
+/// that are to be marched, as neither says anything about them.
+#[expect(clippy::too_many_arguments, reason = "what fills a frame")]
 pub(crate) fn run(
     gpu: &Gpu,
     work: &mut Work<'_>,
     scene: &Scene<'_>,
     frame: &Frame,
     fresh: &Marched,
-    before: &Marched,
+    before: &History<'_>,
+    refined: &Refined,
     out: &Marched,
 ) -> Result<()> {
     let ours = [
         ("fresh", (&fresh.clouds).into()),
         ("fresh_depth", (&fresh.depth).into()),
-        ("history", (&before.clouds).into()),
-        ("history_depth", (&before.depth).into()),
+        ("history", (&before.marched.clouds).into()),
+        ("history_depth", (&before.marched.depth).into()),
+        ("scene_before", before.scene.depth()),
     ];
-    let bindings = [scene.bindings.as_slice(), &out.bindings(), &ours].concat();
+    let bindings = [scene.bindings.as_slice(), &out.bindings(), &refined.bindings(), &ours].concat();
     work.dispatch(
         &*gpu.kernel("reproject", "reproject", scene.variant)?,
         &bindings,

@@ -495,6 +495,10 @@ class Quality(Block):
         whole number from 1 to 4096.
     light_steps : int
         Light samples toward the sun, besides the far one. Allowed: a whole number from 1 to 128.
+    light_share : float
+        Share of a pixel's cloud that is lit as one, by the light samples of one place in it:
+        samples in a row are lit together once they have gathered more. 0 lights each sample by
+        itself. Allowed: a number from 0 to 1.
     sun_volume : bool
         Whether the light samples stay within two cells of a volume, baked around the eye, of
         sunlight through the clouds, and the rest is read there. Not in a grid. Allowed: True or
@@ -541,6 +545,7 @@ class Quality(Block):
     big_step: int = 3
     empty_samples: int = 6
     light_steps: int = 8
+    light_share: float = 0.1
     sun_volume: bool = False
     light_distance: float = 0.0
     far_sample: bool = False

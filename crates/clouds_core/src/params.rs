@@ -349,6 +349,9 @@ params! {
         empty_samples: u32 = 6, in 1..=4096 "";
         /// Light samples toward the sun, besides the far one.
         light_steps: u32 = 8, in 1..=128 "";
+        /// Share of a pixel's cloud that is lit as one, by the light samples of one place in it: samples in a row are lit
+        /// together once they have gathered more. 0 lights each sample by itself.
+        light_share: f32 = 0.1, in 0..=1 "";
         /// Whether the light samples stay within two cells of a volume, baked around the eye, of sunlight through the clouds,
         /// and the rest is read there. Not in a grid.
         sun_volume: bool = false;
@@ -660,6 +663,7 @@ impl Quality {
             step_growth: 0.0,
             big_step: 1,
             light_steps: 5,
+            light_share: 0.0,
             light_distance: 700.0,
             far_sample: true,
             cone: 0.12,

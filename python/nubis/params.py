@@ -544,7 +544,7 @@ class Quality(Block):
     step_growth: float = 1.0
     big_step: int = 3
     empty_samples: int = 6
-    light_steps: int = 8
+    light_steps: int = 16
     light_share: float = 0.1
     sun_volume: bool = False
     light_distance: float = 0.0
@@ -552,7 +552,7 @@ class Quality(Block):
     cone: float = 0.0
     cheap_light: float = 1.0
     min_transmittance: float = 0.01
-    contrast: float = 0.2
+    contrast: float = 0.3
     jitter: bool = True
     view_distance: float = 400000.0
     tolerance: float = 0.0

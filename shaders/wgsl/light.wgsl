@@ -206,20 +206,17 @@ struct Gathered {
     sun: vec4f, // of sun_scattering
     above: vec4f, // share of the ambient light from above
     weight: vec4f, // of all samples: together 1 less the transmittance
-    distance: f32, // weighted, m
 }
 
 fn gather(sum: Gathered, nodes: Nodes, weight: f32, sun: f32, above: f32, distance: f32) -> Gathered {
-    let reached = sum.distance + weight * distance;
     if AIR {
         let w = weight * node_shares(nodes, distance);
-        return Gathered(sum.sun + w * sun, sum.above + w * above, sum.weight + w, reached);
+        return Gathered(sum.sun + w * sun, sum.above + w * above, sum.weight + w);
     }
     return Gathered(
         vec4f(sum.sun.x + weight * sun, 0.0, 0.0, 0.0),
         vec4f(sum.above.x + weight * above, 0.0, 0.0, 0.0),
         vec4f(sum.weight.x + weight, 0.0, 0.0, 0.0),
-        reached,
     );
 }
 

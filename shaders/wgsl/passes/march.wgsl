@@ -170,6 +170,7 @@ fn march_ray(direction: vec3f, limit: f32, offset: f32, within: vec2f) -> Cloud 
     var span = NOWHERE;
     var seen = i; // steps below this one have had their full sample
     var empty = quality.empty_samples; // full samples of zero in a row; from that many on, samples are cheap
+    var reached = 0.0; // distance by weight, m
     var group = Group();
     var looks: array<Look, LOOKS>;
     var count = 0u;
@@ -194,6 +195,7 @@ fn march_ray(direction: vec3f, limit: f32, offset: f32, within: vec2f) -> Cloud 
                 let x = density * frame.extinction * at.length;
                 let weight = transmittance * x * one_minus_exp_over(x);
                 group = with_sample(group, weight, at);
+                reached += weight * at.t;
                 span = vec2f(min(span.x, at.begin), at.begin + at.length);
                 optical_depth += x;
                 transmittance = transmittance_of(optical_depth);
@@ -242,5 +244,5 @@ fn march_ray(direction: vec3f, limit: f32, offset: f32, within: vec2f) -> Cloud 
         transmittance = 0.0;
         span.y = EVERYWHERE.y;
     }
-    return Cloud(scale * gathered_radiance(sum, nodes, direction), transmittance, sum.distance / weight, span);
+    return Cloud(scale * gathered_radiance(sum, nodes, direction), transmittance, reached / weight, span);
 }

@@ -154,6 +154,10 @@ struct PathRay {
 @group(0) @binding(64) var<storage, read_write> shadow_out: array<f32>; // the user's shadow map, row by row
 @group(0) @binding(25) var map_out: texture_storage_2d<rgba16float, write>;
 
+// What is shown in a window (passes/display).
+@group(0) @binding(52) var screen: texture_storage_2d<rgba8unorm, write>;
+@group(0) @binding(53) var<uniform> shown: vec4f; // exposure as a factor, tone map
+
 // Queries at points, and probes of shader functions.
 @group(0) @binding(26) var<storage, read_write> points: array<vec4f>;
 @group(0) @binding(27) var<storage, read_write> results: array<vec4f>;

@@ -54,18 +54,21 @@ fn aces(v: Rgb) -> Rgb {
     transform(&OUTPUT, transform(&INPUT, v.map(|v| v.clamp(0.0, 65504.0))).map(fit)).map(encode_srgb)
 }
 
-/// Turns pixels of `channels` (3 or 4) numbers into 8-bit sRGB. Alpha, where there is one, is kept linear; premultiplied
-/// colours stay premultiplied.
-pub fn to_srgb8(pixels: &[f32], channels: usize, exposure: f32, tone_map: &str) -> Result<Vec<u8>> {
-    let map = match tone_map {
-        "agx" => agx,
-        "aces" => aces,
-        "none" => |v: Rgb| v.map(encode_srgb),
-        _ => return Err(Error::parameter("tonemap", format!("{tone_map:?}"), format!("one of {TONE_MAPS:?}"))),
+/// Which of [`TONE_MAPS`] is meant, of values that are allowed.
+pub(crate) fn tone_map_index(exposure: f32, tone_map: &str) -> Result<usize> {
+    let Some(index) = TONE_MAPS.iter().position(|name| *name == tone_map) else {
+        return Err(Error::parameter("tonemap", format!("{tone_map:?}"), format!("one of {TONE_MAPS:?}")));
     };
     if !exposure.is_finite() {
         return Err(Error::parameter("exposure", exposure, "a finite number of stops"));
     }
+    Ok(index)
+}
+
+/// Turns pixels of `channels` (3 or 4) numbers into 8-bit sRGB. Alpha, where there is one, is kept linear; premultiplied
+/// colours stay premultiplied.
+pub fn to_srgb8(pixels: &[f32], channels: usize, exposure: f32, tone_map: &str) -> Result<Vec<u8>> {
+    let map = [agx, aces, |v: Rgb| v.map(encode_srgb)][tone_map_index(exposure, tone_map)?];
     let gain = exposure.exp2();
     let byte = |v: f32| (v * 255.0 + 0.5) as u8;
     let mut out = Vec::with_capacity(pixels.len());

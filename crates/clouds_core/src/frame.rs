@@ -86,6 +86,10 @@ params! {
         previous_tan_half_fov: f32 = 1.0;
         /// The same of the frame before.
         previous_half_fov: f32 = 1.0;
+        /// Width of the frame before, where it had another size.
+        previous_width: u32 = 1;
+        /// Its height.
+        previous_height: u32 = 1;
         /// How far the eye has moved since the frame before, m.
         eye_motion: [f32; 3] = [0.0, 0.0, 0.0];
         /// How far the wind has carried the clouds since the frame before, m.

@@ -136,6 +136,7 @@ fn choose(adapters: &[AdapterInfo], wanted: Option<&str>) -> Result<usize> {
 pub struct Gpu {
     /// The adapter.
     pub info: AdapterInfo,
+    adapter: wgpu::Adapter,
     pub(crate) device: wgpu::Device,
     pub(crate) queue: wgpu::Queue,
     /// Most bytes that one buffer can hold for a shader.
@@ -177,6 +178,12 @@ impl Gpu {
         let gpu = Arc::new(Self::new(&adapters[index], infos[index].clone())?);
         open.push((index, gpu.clone()));
         Ok(gpu)
+    }
+
+    /// What a window needs that shows pictures of this device without bringing them to memory.
+    pub fn shared(&self) -> (wgpu::Instance, wgpu::Adapter, wgpu::Device, wgpu::Queue) {
+        let instance = INSTANCE.get().expect("a device was opened through it").clone();
+        (instance, self.adapter.clone(), self.device.clone(), self.queue.clone())
     }
 
     fn new(adapter: &wgpu::Adapter, info: AdapterInfo) -> Result<Self> {
@@ -231,6 +238,7 @@ impl Gpu {
         };
         Ok(Self {
             info,
+            adapter: adapter.clone(),
             repeat_sampler: sampler("repeat_sampler", wgpu::AddressMode::Repeat),
             clamp_sampler: sampler("clamp_sampler", wgpu::AddressMode::ClampToEdge),
             mirror_sampler: sampler("mirror_sampler", wgpu::AddressMode::MirrorRepeat),

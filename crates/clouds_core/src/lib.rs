@@ -27,5 +27,7 @@ pub use camera::Camera;
 pub use error::{Error, Result};
 pub use gpu::{AdapterInfo, Gpu, adapters};
 pub use params::{Params, Quality};
+pub use passes::display::Screen;
 pub use renderer::Renderer;
 pub use volume::DensityGrid;
+pub use wgpu;

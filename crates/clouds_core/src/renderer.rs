@@ -18,6 +18,7 @@ use crate::params::{self, Model, Params, Quality};
 use crate::passes::beams::{self, Beams};
 use crate::passes::broad_weather::BroadWeather;
 use crate::passes::composite::Composed;
+use crate::passes::display::{self, Screen};
 use crate::passes::high_clouds::{self, HighClouds};
 use crate::passes::majorant::Majorants;
 use crate::passes::march::Marched;
@@ -154,6 +155,7 @@ struct Refining {
 
 /// Buffers of whole pictures, and what reprojection remembers of the frame before.
 struct Animation {
+    size: [u32; 2],
     refined: Refined,
     fresh: Marched,
     before: Marched,
@@ -179,11 +181,7 @@ impl Renderer {
     /// a name, or none for the best.
     pub fn new(width: u32, height: u32, quality: Quality, adapter: Option<&str>) -> Result<Self> {
         quality.check()?;
-        for (name, value) in [("width", width), ("height", height)] {
-            if !(1..=65536).contains(&value) {
-                return Err(Error::parameter(name, value, "a whole number from 1 to 65536 pixels"));
-            }
-        }
+        check_size([width, height])?;
         // Each takes a process's first renderer some 20 ms of one thread.
         let gpu = thread::scope(|scope| {
             scope.spawn(|| LazyLock::force(&blue_noise::TILE));
@@ -231,6 +229,20 @@ impl Renderer {
     /// The device.
     pub fn gpu(&self) -> &Arc<Gpu> {
         &self.gpu
+    }
+
+    /// Makes pictures of another size and by another method from now on; what has been baked stays, and an animation goes on
+    /// in the new size.
+    pub fn set(&mut self, width: u32, height: u32, quality: Quality) -> Result<()> {
+        quality.check()?;
+        check_size([width, height])?;
+        self.size = [width, height];
+        if self.quality != quality {
+            self.quality = quality;
+            self.cut();
+        }
+        self.refining = None;
+        Ok(())
     }
 
     /// Width and height in pixels.
@@ -377,6 +389,42 @@ impl Renderer {
         if Method::new(params, &self.quality) != Method::March {
             return self.refine(camera, params, time, background, scene_depth, interrupt);
         }
+        self.next_frame(camera, params, time, background, scene_depth, None, interrupt)
+    }
+
+    /// The same, of the whole sky, onto a screen of the size of the pictures, without bringing it to memory.
+    pub fn animate_onto(
+        &mut self,
+        screen: &Screen,
+        camera: &Camera,
+        params: &Params,
+        time: f64,
+        interrupt: Interrupt<'_>,
+    ) -> Result<()> {
+        if screen.size() != self.size {
+            let [width, height] = screen.size();
+            let [w, h] = self.size;
+            return Err(Error::parameter("screen", format!("{width} x {height}"), format!("of {w} x {h} pixels")));
+        }
+        if Method::new(params, &self.quality) != Method::March {
+            let image = self.refine(camera, params, time, true, None, interrupt)?;
+            return screen.write(&self.gpu, &image);
+        }
+        self.next_frame(camera, params, time, true, None, Some(screen), interrupt).map(drop)
+    }
+
+    /// The next frame of what is marched, onto a screen or, without one, to memory.
+    #[expect(clippy::too_many_arguments, reason = "what a frame depends on")]
+    fn next_frame(
+        &mut self,
+        camera: &Camera,
+        params: &Params,
+        time: f64,
+        background: bool,
+        scene_depth: Option<SceneDepth<'_>>,
+        screen: Option<&Screen>,
+        interrupt: Interrupt<'_>,
+    ) -> Result<Vec<f32>> {
         let (mut frame, params) = self.begin(camera, params, time)?;
         scene_depth.map_or(Ok(()), |scene| scene.check(self.size))?;
         let params = &params;
@@ -397,15 +445,14 @@ impl Renderer {
         }
         let cells = [width.div_ceil(STRIDE), height.div_ceil(STRIDE)];
         let Self { gpu, world, quality, timings, .. } = self;
-        let animation = self.animation.get_or_insert_with(|| Animation {
-            refined: Refined::new(gpu, pixels),
-            fresh: Marched::new(gpu, u64::from(cells[0]) * u64::from(cells[1])),
-            before: Marched::new(gpu, pixels),
-            now: Marched::new(gpu, pixels),
-            composed: Composed::new(gpu, pixels),
-            scene_before: SceneTextures::new(gpu, 0, false),
-            last: None,
-        });
+        let mut resized = None;
+        if let Some(old) = self.animation.take_if(|old| old.size != [width, height]) {
+            // Without a scene, whose edges would not be where they were.
+            let last = old.last.filter(|last| last.scene.is_none() && scene_depth.is_none());
+            self.animation = Some(Animation { last, ..Animation::new(gpu, [width, height]) });
+            resized = Some((old.before, old.size));
+        }
+        let animation = self.animation.get_or_insert_with(|| Animation::new(gpu, [width, height]));
         // Taken out while the frame is in the making: if it fails, the next one starts anew.
         let last = animation.last.take().filter(|last| !last.is_cut(camera, params, time));
         // A frame without clouds leaves no history.
@@ -433,7 +480,7 @@ impl Renderer {
         if let Some(last) = &last {
             frame.set_previous(&last.frame, camera.eye - last.camera.eye, &Carried::new(params, last.time, time));
             frame.moving = u32::from(last.camera != *camera || last.params != *params || last.time != time);
-            frame.moving |= u32::from(had != has);
+            frame.moving |= u32::from(had != has || resized.is_some());
         }
         // While anything moves, each round of the sixteen pixels moves the blue noise on by the golden ratio; a static
         // shot keeps the still's, and so becomes the still.
@@ -446,6 +493,13 @@ impl Renderer {
 
         let mut ctx = Context { gpu, uniforms: scene.uniforms, variant: scene.variant, timings, interrupt };
         let Animation { refined, fresh, before, now, composed, scene_before, .. } = &*animation;
+        if let (Some((old, size)), Some(_)) = (&resized, &last) {
+            [frame.previous_width, frame.previous_height] = *size;
+            scene.uniforms.upload_frame(gpu, &frame);
+            let mut work = gpu.work();
+            reproject::rescale(gpu, &mut work, &scene, &frame, old, before)?;
+            work.submit(ctx.timings, interrupt)?;
+        }
         if frame.cloudless > 0 {
             frame.sheet_rows = height;
         } else if last.is_none() {
@@ -475,10 +529,14 @@ impl Renderer {
             let mut ctx = Context { gpu, uniforms: scene.uniforms, variant: scene.variant, timings, interrupt };
             march_listed(&mut ctx, &scene, &mut frame, rays, &mut self.march_pace, refined, now)?;
         }
-        let mut image = Vec::with_capacity(4 * pixels as usize);
+        let mut image = Vec::with_capacity(screen.map_or(4 * pixels as usize, |_| 0));
         in_bands(&mut self.pixel_pace, gpu, &scene, &mut frame, [width, height], |frame| {
             let mut work = gpu.work();
             composite::run(gpu, &mut work, &scene, frame, now, composed, false)?;
+            if let Some(screen) = screen {
+                display::run(gpu, &mut work, &scene, frame, composed, screen)?;
+                return work.submit(timings, interrupt).map(drop);
+            }
             let (row, rows) = (u64::from(frame.first_row), u64::from(frame.rows));
             work.download(&composed.image, 16 * u64::from(width) * row, 16 * u64::from(width) * rows);
             image.extend_from_slice(work.submit(timings, interrupt)?[0].numbers());
@@ -861,6 +919,23 @@ impl Still {
     }
 }
 
+impl Animation {
+    fn new(gpu: &Gpu, [width, height]: [u32; 2]) -> Self {
+        let pixels = u64::from(width) * u64::from(height);
+        let cells = u64::from(width.div_ceil(STRIDE)) * u64::from(height.div_ceil(STRIDE));
+        Self {
+            size: [width, height],
+            refined: Refined::new(gpu, pixels),
+            fresh: Marched::new(gpu, cells),
+            before: Marched::new(gpu, pixels),
+            now: Marched::new(gpu, pixels),
+            composed: Composed::new(gpu, pixels),
+            scene_before: SceneTextures::new(gpu, 0, false),
+            last: None,
+        }
+    }
+}
+
 impl Shot {
     /// Whether what was seen before says nothing about what is seen now.
     fn is_cut(&self, camera: &Camera, params: &Params, time: f64) -> bool {
@@ -893,6 +968,15 @@ fn weather_change(old: &Params, new: &Params) -> f32 {
         old.iter().find(|(before, _)| *before == weather).map_or(0.0, |(_, before)| before.min(share))
     };
     1.0 - new.weather_shares().into_iter().map(kept).sum::<f32>()
+}
+
+fn check_size([width, height]: [u32; 2]) -> Result<()> {
+    for (name, value) in [("width", width), ("height", height)] {
+        if !(1..=65536).contains(&value) {
+            return Err(Error::parameter(name, value, "a whole number from 1 to 65536 pixels"));
+        }
+    }
+    Ok(())
 }
 
 /// Most texels along a side of the user's shadow map.

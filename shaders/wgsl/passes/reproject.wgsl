@@ -91,6 +91,29 @@ fn reproject(@builtin(global_invocation_id) id: vec3u) {
     }
 }
 
+// The frame before in the size of this one: what lies between its pixels.
+@compute @workgroup_size(8, 8)
+fn rescale(@builtin(global_invocation_id) id: vec3u) {
+    if id.x >= frame.width || id.y >= frame.height {
+        return;
+    }
+    let size = vec2f(vec2u(frame.previous_width, frame.previous_height));
+    let at = (vec2f(id.xy) + 0.5) * size / vec2f(vec2u(frame.width, frame.height)) - 0.5;
+    let corner = vec2i(floor(at));
+    let f = at - floor(at);
+    let above = mix(history[previous_index(corner)], history[previous_index(corner + vec2i(1, 0))], f.x);
+    let below = mix(history[previous_index(corner + vec2i(0, 1))], history[previous_index(corner + 1)], f.x);
+    let index = id.y * frame.width + id.x;
+    clouds[index] = mix(above, below, f.y);
+    cloud_depth[index] = history_depth[previous_index(vec2i(round(at)))];
+}
+
+fn previous_index(pixel: vec2i) -> u32 {
+    let size = vec2i(vec2u(frame.previous_width, frame.previous_height));
+    let inside = vec2u(clamp(pixel, vec2i(0), size - 1));
+    return inside.y * frame.previous_width + inside.x;
+}
+
 // Fills a pixel of a cell, for what the frame before has in its place; `alone`, it is marched instead.
 fn fill(cell: Cell, place: vec2i, old: vec4f, alone: bool) {
     let pixel = cell.corner + place;

@@ -3,6 +3,7 @@
 pub mod beams;
 pub mod broad_weather;
 pub mod composite;
+pub mod display;
 pub mod high_clouds;
 pub mod majorant;
 pub mod march;

@@ -67,3 +67,17 @@ pub(crate) fn run(
         [frame.march_width, frame.rows.div_ceil(STRIDE), 1],
     )
 }
+
+/// Makes of the frame `before`, which had another size, one of the size of `frame`.
+pub(crate) fn rescale(
+    gpu: &Gpu,
+    work: &mut Work<'_>,
+    scene: &Scene<'_>,
+    frame: &Frame,
+    before: &Marched,
+    out: &Marched,
+) -> Result<()> {
+    let old = [("history", (&before.clouds).into()), ("history_depth", (&before.depth).into())];
+    let bindings = [scene.bindings.as_slice(), &out.bindings(), &old].concat();
+    work.dispatch(&*gpu.kernel("reproject", "rescale", scene.variant)?, &bindings, [frame.width, frame.height, 1])
+}

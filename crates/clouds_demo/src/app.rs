@@ -1,0 +1,487 @@
+//! The window: one function that reads top to bottom.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context as _, Result};
+use clouds_core::color::{TONE_MAPS, to_srgb8};
+use clouds_core::{Camera, Error, Gpu, Params, Quality, files};
+use eframe::egui::{self, Key, PointerButton, Sense, Ui, ViewportCommand};
+use eframe::egui_wgpu::RenderState;
+use eframe::wgpu::FilterMode;
+use glam::DVec3;
+
+use crate::flight::{Controls, Flight};
+use crate::painter::{Painter, Shown, Wish};
+use crate::panel::Panel;
+use crate::preset::{self, Shot};
+use crate::sight::Sight;
+use crate::sun::Clock;
+
+/// Degrees that a dragged or captured pointer turns the view for each point.
+const TURN: f64 = 0.15;
+/// Longest step of the flight, s: after a hitch nobody is elsewhere at once.
+const LONGEST_STEP: f64 = 0.25;
+/// The methods that the menu offers.
+const QUALITIES: [&str; 3] = ["draft", "balanced", "high"];
+/// Places to be: name, altitude in m, degrees above the horizon.
+const PLACES: [(&str, f64, f64); 4] =
+    [("ground", 1.7, 12.0), ("in cloud", 1900.0, 2.0), ("above", 4500.0, -12.0), ("space", 300_000.0, -18.0)];
+
+/// What the command line asks for.
+#[derive(Clone, Debug, Default)]
+pub struct Start {
+    /// A scene's name, or a TOML file.
+    pub scene: Option<String>,
+    /// Part of an adapter's name.
+    pub adapter: Option<String>,
+    /// Leave after so many pictures.
+    pub frames: Option<u64>,
+    /// Where a picture of the window goes then.
+    pub screenshot: Option<PathBuf>,
+    /// Frames a second that moving pictures shall reach.
+    pub rate: Option<f64>,
+    /// Forward from the first picture on.
+    pub fly: bool,
+}
+
+/// The window's state.
+pub struct App {
+    start: Start,
+    painter: Painter,
+    scenes: Vec<(String, Camera, Params)>,
+    flight: Flight,
+    params: Params,
+    time: f64,
+    playing: bool,
+    clock: Clock,
+    quality: Quality,
+    quality_name: String,
+    exposure: f32,
+    tone_map: &'static str,
+    sight: Sight,
+    rate: f64,
+    panel: Panel,
+    captured: bool,
+    folder: PathBuf,
+    /// What was done last, or went wrong.
+    notice: String,
+    shown: Option<Shown>,
+    texture: Option<egui::TextureId>,
+    last_step: Instant,
+    leaving: bool,
+}
+
+impl App {
+    /// A window on the clouds of a device, which it shares.
+    pub fn new(context: &egui::Context, gpu: Arc<Gpu>, start: Start) -> Result<Self> {
+        let repaint = context.clone();
+        let painter = Painter::new(gpu, start.adapter.clone(), move || repaint.request_repaint());
+        let scenes = preset::scenes()?;
+        let name = start.scene.clone().unwrap_or_else(|| "fair_weather".into());
+        let (flight, params) = match scenes.iter().find(|(scene, ..)| *scene == name) {
+            Some((_, camera, params)) => (Flight::at(camera), params.clone()),
+            None if Path::new(&name).exists() => (Flight::at(&scenes[0].1), preset::load(Path::new(&name))?),
+            None => {
+                let names: Vec<_> = scenes.iter().map(|(name, ..)| name.as_str()).collect();
+                anyhow::bail!("{name:?} is neither a TOML file nor a scene: {}", names.join(", "));
+            }
+        };
+        Ok(Self {
+            rate: start.rate.unwrap_or(20.0),
+            start,
+            painter,
+            scenes,
+            flight,
+            params,
+            time: 0.0,
+            playing: false,
+            clock: Clock::default(),
+            quality: Quality::named("balanced")?,
+            quality_name: "balanced".into(),
+            exposure: 0.0,
+            tone_map: TONE_MAPS[0],
+            sight: Sight::Picture,
+            panel: Panel::default(),
+            captured: false,
+            folder: std::env::current_dir().unwrap_or_default(),
+            notice: String::new(),
+            shown: None,
+            texture: None,
+            last_step: Instant::now(),
+            leaving: false,
+        })
+    }
+
+    /// The picture that is shown.
+    pub fn shown(&self) -> Option<&Shown> {
+        self.shown.as_ref()
+    }
+
+    /// What was done last, or went wrong.
+    pub fn notice(&self) -> &str {
+        &self.notice
+    }
+
+    /// Someone on their way.
+    pub fn flight(&self) -> &Flight {
+        &self.flight
+    }
+
+    /// The sky.
+    pub fn params(&self) -> &Params {
+        &self.params
+    }
+
+    /// One frame of the window.
+    pub fn frame(&mut self, ui: &mut Ui, device: Option<&RenderState>) {
+        self.receive(ui, device);
+        self.read_dropped_files(ui);
+        egui::Panel::top("top").show(ui, |ui| self.menu(ui));
+        egui::Panel::bottom("status").show(ui, |ui| self.status(ui));
+        egui::Panel::left("panel").default_size(330.0).show(ui, |ui| self.settings(ui));
+        let view = egui::CentralPanel::no_frame().show(ui, |ui| self.view(ui)).inner;
+        self.go_on(ui, &view);
+        self.ask(ui, view.rect);
+        self.leave_when_done(ui);
+    }
+
+    /// Takes a new picture, or a problem, from the painter.
+    fn receive(&mut self, ui: &Ui, device: Option<&RenderState>) {
+        match self.painter.problem() {
+            Some(problem @ Error::Parameter(_)) => self.notice = problem.to_string(),
+            Some(problem) => {
+                // Nothing more can be painted, and the window is on the same device.
+                eprintln!("{problem}");
+                self.notice = problem.to_string();
+                self.leaving = true;
+                ui.ctx().send_viewport_cmd(ViewportCommand::Close);
+            }
+            None => {}
+        }
+        let Some(shown) = self.painter.shown() else { return };
+        if self.shown.as_ref().is_some_and(|old| old.count == shown.count) {
+            return;
+        }
+        if let Some(device) = device {
+            let mut renderer = device.renderer.write();
+            let view = shown.screen.view();
+            match self.texture {
+                Some(id) => {
+                    renderer.update_egui_texture_from_wgpu_texture(&device.device, view, FilterMode::Linear, id);
+                }
+                None => {
+                    self.texture = Some(renderer.register_native_texture(&device.device, view, FilterMode::Linear));
+                }
+            }
+        }
+        self.shown = Some(shown);
+    }
+
+    fn read_dropped_files(&mut self, ui: &Ui) {
+        let dropped = ui.input(|input| input.raw.dropped_files.clone());
+        if let Some(path) = dropped.first().map(|file| file.path().to_path_buf()) {
+            let loaded = preset::load(&path).map(|params| self.params = params);
+            self.say(loaded, format!("read {}", path.display()));
+        }
+    }
+
+    fn say(&mut self, outcome: Result<()>, done: String) {
+        self.notice = outcome.map_or_else(|error| format!("{error:#}"), |()| done);
+    }
+
+    fn menu(&mut self, ui: &mut Ui) {
+        ui.horizontal_wrapped(|ui| {
+            egui::ComboBox::from_label("scene").selected_text("go to").show_ui(ui, |ui| {
+                for (name, camera, params) in &self.scenes {
+                    if ui.selectable_label(false, name.replace('_', " ")).clicked() {
+                        (self.flight, self.params) = (Flight::at(camera), params.clone());
+                    }
+                }
+            });
+            for (name, altitude, pitch) in PLACES {
+                if ui.button(name).clicked() {
+                    (self.flight.eye.z, self.flight.pitch, self.flight.flying) = (altitude, pitch, true);
+                }
+            }
+            ui.separator();
+            egui::ComboBox::from_label("at rest").selected_text(&self.quality_name).show_ui(ui, |ui| {
+                for name in QUALITIES {
+                    if ui.selectable_label(self.quality_name == name, name).clicked()
+                        && let Ok(quality) = Quality::named(name)
+                    {
+                        (self.quality, self.quality_name) = (quality, name.into());
+                    }
+                }
+            });
+            egui::ComboBox::from_label("shown").selected_text(self.sight.name()).show_ui(ui, |ui| {
+                for sight in Sight::ALL {
+                    ui.selectable_value(&mut self.sight, sight, sight.name());
+                }
+            });
+            egui::ComboBox::from_label("tone map").selected_text(self.tone_map).show_ui(ui, |ui| {
+                for name in TONE_MAPS {
+                    ui.selectable_value(&mut self.tone_map, name, name);
+                }
+            });
+            ui.add(egui::Slider::new(&mut self.exposure, -8.0..=16.0).suffix(" stops").text("exposure"));
+            ui.add(egui::Slider::new(&mut self.rate, 2.0..=120.0).logarithmic(true).suffix(" Hz").text("wanted"));
+            ui.separator();
+            if ui.button("Save picture").on_hover_text("PNG and EXR, in the current folder").clicked() {
+                let saved = self.save_picture();
+                self.say_path(saved);
+            }
+            if ui.button("Save sky").on_hover_text("TOML; drop such a file here to read it").clicked() {
+                let path = self.free_path("sky", "toml");
+                let saved = preset::save(&path, &self.params).map(|()| path);
+                self.say_path(saved);
+            }
+            if ui.button("Copy as Python").clicked() {
+                let copied = self.python().map(|code| ui.ctx().copy_text(code));
+                self.say(copied, "copied".into());
+            }
+        });
+    }
+
+    fn say_path(&mut self, saved: Result<PathBuf>) {
+        self.notice = saved.map_or_else(|error| format!("{error:#}"), |path| format!("wrote {}", path.display()));
+    }
+
+    /// The first name with a number that is not taken.
+    fn free_path(&self, stem: &str, extension: &str) -> PathBuf {
+        let path = |n: u32| self.folder.join(format!("{stem}{n}.{extension}"));
+        (1..).map(path).find(|path| !path.exists()).expect("numbers do not end")
+    }
+
+    /// Writes the still that is shown.
+    fn save_picture(&self) -> Result<PathBuf> {
+        let shown = self.shown.as_ref().filter(|shown| shown.wish.sight == Sight::Picture);
+        let still = shown.and_then(|shown| Some((shown, shown.still.as_ref()?)));
+        let (shown, picture) = still.context("hold still until the picture is at its best, then save it")?;
+        let (size, wish) = (shown.screen.size().map(|side| side as usize), &shown.wish);
+        let path = self.free_path("sky", "png");
+        files::write_png(&path, &to_srgb8(&picture.image, 4, wish.exposure, wish.tone_map)?, size, 4)?;
+        files::write_exr(&path.with_extension("exr"), &picture.image, size, 4)?;
+        Ok(path)
+    }
+
+    /// The lines that make the picture at rest.
+    fn python(&self) -> Result<String> {
+        let camera = self.flight.camera()?;
+        let file = if preset::needs_file(&self.params) {
+            let path = self.free_path("sky", "toml");
+            preset::save(&path, &self.params)?;
+            Some(path.display().to_string())
+        } else {
+            None
+        };
+        let size = self.shown.as_ref().map_or([960, 540], |shown| shown.wish.window);
+        let shot = Shot {
+            camera: &camera,
+            params: &self.params,
+            time: self.time,
+            quality: &self.quality_name,
+            size,
+            exposure: self.exposure,
+            tone_map: self.tone_map,
+        };
+        Ok(preset::python(&shot, file.as_deref()))
+    }
+
+    fn settings(&mut self, ui: &mut Ui) {
+        egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+            ui.add(egui::TextEdit::singleline(&mut self.panel.search).hint_text("search"));
+            if let Some(refused) = &self.panel.refused {
+                ui.colored_label(ui.visuals().error_fg_color, refused);
+            }
+            egui::CollapsingHeader::new("time").default_open(true).show(ui, |ui| self.times(ui));
+            self.panel.sky(ui, &mut self.params);
+            let usual = Quality::named(&self.quality_name).unwrap_or_default();
+            self.panel.quality(ui, &mut self.quality, &usual);
+        });
+    }
+
+    /// The clouds' time and that of the day.
+    fn times(&mut self, ui: &mut Ui) {
+        ui.horizontal(|ui| {
+            ui.toggle_value(&mut self.playing, "▶ wind");
+            ui.add(egui::DragValue::new(&mut self.time).speed(1.0).suffix(" s"));
+        });
+        let before = self.clock;
+        ui.horizontal(|ui| {
+            ui.toggle_value(&mut self.clock.playing, "▶ sun");
+            ui.add(egui::Slider::new(&mut self.clock.hour, 0.0..=24.0).suffix(" h").text("hour"));
+        });
+        ui.add(egui::Slider::new(&mut self.clock.rate, 0.1..=60.0).logarithmic(true).suffix(" h/min").text("rate"));
+        ui.add(egui::Slider::new(&mut self.clock.latitude, -90.0..=90.0).suffix("°").text("latitude"));
+        ui.add(egui::Slider::new(&mut self.clock.day, 1..=365).text("day of the year"));
+        let changed = Clock { playing: before.playing, rate: before.rate, ..self.clock } != before;
+        if changed {
+            self.set_sun();
+        }
+    }
+
+    fn set_sun(&mut self) {
+        match self.clock.sun() {
+            Ok((elevation, azimuth)) => {
+                (self.params.sun.elevation, self.params.sun.azimuth) = (elevation as f32, azimuth as f32);
+            }
+            Err(error) => self.notice = format!("{error:#}"),
+        }
+    }
+
+    fn status(&mut self, ui: &mut Ui) {
+        ui.horizontal_wrapped(|ui| {
+            let flight = &self.flight;
+            ui.monospace(format!("{:>3.0}° {:<2}", flight.azimuth, flight.compass()));
+            ui.monospace(format!("{:>7.0} m", flight.eye.z));
+            let speed = if flight.flying { format!("{:.0} m/s", flight.speed) } else { "on foot".into() };
+            ui.monospace(speed);
+            if let Some(shown) = &self.shown {
+                let [width, height] = shown.screen.size();
+                let kind = if shown.still.is_some() { "still" } else { "moving" };
+                ui.monospace(format!("{width} x {height} {kind} {:.0} ms", 1e3 * shown.took.as_secs_f64()));
+            }
+            ui.separator();
+            ui.label(&self.notice);
+        });
+    }
+
+    fn view(&mut self, ui: &mut Ui) -> egui::Response {
+        let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::click_and_drag());
+        if let Some(texture) = self.texture {
+            let all = egui::Rect::from_min_max(egui::pos2(0.0, 0.0), egui::pos2(1.0, 1.0));
+            ui.painter().image(texture, rect, all, egui::Color32::WHITE);
+        }
+        response.on_hover_cursor(egui::CursorIcon::Crosshair)
+    }
+
+    /// Moves the visitor, the clouds and the sun by the time since the last frame.
+    fn go_on(&mut self, ui: &Ui, view: &egui::Response) {
+        let seconds = self.last_step.elapsed().as_secs_f64().min(LONGEST_STEP);
+        self.last_step = Instant::now();
+        self.capture(ui, view);
+        let mut controls = self.controls(ui, view);
+        if self.start.fly && self.shown.is_some() {
+            controls.toward[0] = 1.0;
+        }
+        self.flight.step(&controls, seconds);
+        if self.playing {
+            self.time += seconds;
+        }
+        let sun_moves = self.clock.step(seconds);
+        if sun_moves {
+            self.set_sun();
+        }
+        if controls.is_any() || self.flight.is_falling() || self.playing || sun_moves {
+            ui.ctx().request_repaint();
+        }
+    }
+
+    /// A click in the view takes the pointer, Esc gives it back.
+    fn capture(&mut self, ui: &Ui, view: &egui::Response) {
+        let wanted = if view.clicked() {
+            view.surrender_focus();
+            true
+        } else {
+            self.captured && !ui.input(|input| input.key_pressed(Key::Escape) || !input.focused)
+        };
+        if wanted != self.captured {
+            self.captured = wanted;
+            let grab = if wanted { egui::CursorGrab::Locked } else { egui::CursorGrab::None };
+            ui.ctx().send_viewport_cmd(ViewportCommand::CursorGrab(grab));
+            ui.ctx().send_viewport_cmd(ViewportCommand::CursorVisible(!wanted));
+        }
+    }
+
+    fn controls(&mut self, ui: &Ui, view: &egui::Response) -> Controls {
+        let mut controls = Controls::default();
+        let typing = ui.ctx().egui_wants_keyboard_input();
+        ui.input(|input| {
+            if !typing {
+                let axis = |plus, minus| f64::from(input.key_down(plus)) - f64::from(input.key_down(minus));
+                controls.toward = [axis(Key::W, Key::S), axis(Key::D, Key::A), axis(Key::E, Key::Q)];
+                controls.fast = input.modifiers.shift;
+                controls.slow = input.modifiers.ctrl;
+                controls.jump = input.key_down(Key::Space);
+                if input.key_pressed(Key::F) {
+                    self.flight.switch();
+                }
+            }
+            let turned = if self.captured {
+                input.pointer.motion().unwrap_or_default()
+            } else if view.dragged_by(PointerButton::Primary) {
+                -view.drag_delta()
+            } else {
+                egui::Vec2::ZERO
+            };
+            controls.look = [TURN * f64::from(turned.x), -TURN * f64::from(turned.y)];
+            if self.captured || view.hovered() {
+                controls.wheel = f64::from(input.smooth_scroll_delta().y) / 50.0;
+            }
+        });
+        controls
+    }
+
+    /// Wishes for the picture of now.
+    fn ask(&mut self, ui: &Ui, rect: egui::Rect) {
+        let scale = ui.pixels_per_point();
+        let window = [rect.width(), rect.height()].map(|side| (side * scale).round().clamp(1.0, 8192.0) as u32);
+        // A minimised window has no view.
+        if rect.width() < 1.0 || rect.height() < 1.0 {
+            return;
+        }
+        let (camera, moving_quality) = match (self.flight.camera(), Quality::named("draft")) {
+            (Ok(camera), Ok(draft)) => (camera, draft),
+            (Err(error), _) | (_, Err(error)) => {
+                self.notice = error.to_string();
+                return;
+            }
+        };
+        self.painter.ask(Wish {
+            camera,
+            params: self.params.clone(),
+            time: self.time,
+            quality: self.quality.clone(),
+            moving_quality,
+            window,
+            exposure: self.exposure,
+            tone_map: self.tone_map,
+            wanted: Some(Duration::from_secs_f64(1.0 / self.rate)),
+            sight: self.sight,
+        });
+    }
+
+    /// After as many pictures as were asked for, perhaps with a picture of the window.
+    fn leave_when_done(&mut self, ui: &Ui) {
+        let count = self.shown.as_ref().map_or(0, |shown| shown.count);
+        if self.leaving || self.start.frames.is_none_or(|frames| count < frames) {
+            return;
+        }
+        self.leaving = true;
+        let Some(path) = self.start.screenshot.clone() else {
+            ui.ctx().send_viewport_cmd(ViewportCommand::Close);
+            return;
+        };
+        let context = ui.ctx().clone();
+        ui.ctx().request_screenshot(move |image| {
+            let pixels: Vec<_> = image.pixels.iter().flat_map(|pixel| pixel.to_array()).collect();
+            if let Err(error) = files::write_png(&path, &pixels, image.size, 4) {
+                eprintln!("{error}");
+            }
+            context.send_viewport_cmd(ViewportCommand::Close);
+        });
+    }
+
+    /// Puts the visitor elsewhere.
+    pub fn go_to(&mut self, eye: DVec3) {
+        self.flight.eye = eye;
+    }
+}
+
+impl eframe::App for App {
+    fn ui(&mut self, ui: &mut Ui, frame: &mut eframe::Frame) {
+        self.frame(ui, frame.wgpu_render_state());
+    }
+}

@@ -1,0 +1,83 @@
+//! `clouds_demo`: opens the window.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context as _, Result, anyhow};
+use clap::Parser;
+use clouds_core::Gpu;
+use clouds_demo::app::{App, Start};
+use eframe::egui::ViewportBuilder;
+use eframe::egui_wgpu::{WgpuConfiguration, WgpuSetup, WgpuSetupExisting};
+
+/// Fly through clouds. W A S D move, Q and E go down and up, F lands and takes off, Space jumps, Shift is fast, Control slow,
+/// the wheel sets the speed; drag to look around, or click to take the pointer and press Esc to give it back.
+#[derive(Parser)]
+struct Arguments {
+    /// A scene, such as fair_weather or storm, or a TOML file
+    #[arg(long)]
+    scene: Option<String>,
+    /// Width and height of the window
+    #[arg(long, default_value = "1280x720", value_parser = size)]
+    size: (f32, f32),
+    /// Part of the name of the adapter (see `python -m nubis adapters`)
+    #[arg(long, env = "NUBIS_ADAPTER")]
+    adapter: Option<String>,
+    /// Frames a second that are wanted while anything moves: the resolution follows
+    #[arg(long, value_parser = rate)]
+    rate: Option<f64>,
+    /// Leave after so many pictures
+    #[arg(long)]
+    frames: Option<u64>,
+    /// Save a picture of the window (PNG) before leaving
+    #[arg(long, requires = "frames")]
+    screenshot: Option<PathBuf>,
+    /// Fly ahead from the first picture on
+    #[arg(long)]
+    fly: bool,
+}
+
+fn size(text: &str) -> Result<(f32, f32)> {
+    let (width, height) = text.split_once('x').context("it must be WIDTHxHEIGHT, such as 1280x720")?;
+    let side = |text: &str| -> Result<f32> {
+        let side: u16 = text.parse()?;
+        (64..=16384).contains(&side).then_some(f32::from(side)).context("each must be from 64 to 16384")
+    };
+    Ok((side(width)?, side(height)?))
+}
+
+fn rate(text: &str) -> Result<f64> {
+    let rate: f64 = text.parse()?;
+    (1.0..=1000.0).contains(&rate).then_some(rate).context("it must be from 1 to 1000 frames a second")
+}
+
+fn main() -> ExitCode {
+    match run(Arguments::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("{error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(arguments: Arguments) -> Result<()> {
+    let gpu = Gpu::open(arguments.adapter.as_deref())?;
+    let (instance, adapter, device, queue) = gpu.shared();
+    let setup = WgpuSetup::Existing(WgpuSetupExisting { instance, adapter, device, queue });
+    let options = eframe::NativeOptions {
+        viewport: ViewportBuilder::default().with_title("nubis").with_inner_size(arguments.size).with_drag_and_drop(true),
+        wgpu_options: WgpuConfiguration { wgpu_setup: setup, ..Default::default() },
+        ..Default::default()
+    };
+    let start = Start {
+        scene: arguments.scene,
+        adapter: arguments.adapter,
+        frames: arguments.frames,
+        screenshot: arguments.screenshot,
+        rate: arguments.rate,
+        fly: arguments.fly,
+    };
+    eframe::run_native("nubis", options, Box::new(|context| Ok(Box::new(App::new(&context.egui_ctx, gpu, start)?))))
+        .map_err(|error| anyhow!("{error}"))
+}

@@ -1,0 +1,268 @@
+//! Makes the pictures on a thread of its own, so that the window never waits for one.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+
+use clouds_core::gpu::Timings;
+use clouds_core::renderer::Picture;
+use clouds_core::{Camera, Error, Gpu, Params, Quality, Renderer, Result, Screen};
+
+use crate::resolution::Resolution;
+use crate::sight::{Sight, pixels_of};
+
+/// How long everything has to stand still before it is rendered at its best.
+const REST: Duration = Duration::from_millis(300);
+
+/// What is to be seen.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Wish {
+    /// From where.
+    pub camera: Camera,
+    /// The sky.
+    pub params: Params,
+    /// Its time, s.
+    pub time: f64,
+    /// The method of stills.
+    pub quality: Quality,
+    /// That of moving pictures.
+    pub moving_quality: Quality,
+    /// Pixels of the view.
+    pub window: [u32; 2],
+    /// Stops.
+    pub exposure: f32,
+    /// One of [`clouds_core::color::TONE_MAPS`].
+    pub tone_map: &'static str,
+    /// How long a moving picture may take; without, it has all pixels.
+    pub wanted: Option<Duration>,
+    /// What of it is shown.
+    pub sight: Sight,
+}
+
+/// A picture that is ready.
+#[derive(Clone)]
+pub struct Shown {
+    /// Where it is.
+    pub screen: Arc<Screen>,
+    /// What it is of.
+    pub wish: Arc<Wish>,
+    /// The whole of a still.
+    pub still: Option<Arc<Picture>>,
+    /// How long it took.
+    pub took: Duration,
+    /// Where the time went on the device.
+    pub timings: Timings,
+    /// How many pictures there have been.
+    pub count: u64,
+}
+
+#[derive(Default)]
+struct Inbox {
+    wish: Option<Arc<Wish>>,
+    number: u64,
+    closed: bool,
+}
+
+#[derive(Default)]
+struct Outbox {
+    shown: Option<Shown>,
+    problem: Option<Error>,
+}
+
+struct Shared {
+    inbox: Mutex<Inbox>,
+    changed: Condvar,
+    outbox: Mutex<Outbox>,
+    notify: Box<dyn Fn() + Send + Sync>,
+}
+
+/// The thread that makes pictures; it ends with this.
+pub struct Painter {
+    shared: Arc<Shared>,
+    thread: Option<JoinHandle<()>>,
+}
+
+// No panic leaves what is behind a lock half written.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Painter {
+    /// Starts it; `notify` is called from it when a picture or a problem has come.
+    pub fn new(gpu: Arc<Gpu>, adapter: Option<String>, notify: impl Fn() + Send + Sync + 'static) -> Self {
+        let shared = Arc::new(Shared {
+            inbox: Mutex::default(),
+            changed: Condvar::new(),
+            outbox: Mutex::default(),
+            notify: Box::new(notify),
+        });
+        let inner = shared.clone();
+        let thread = thread::spawn(move || {
+            let work = || Work::new(&gpu, adapter.as_deref())?.run(&inner);
+            let ended = catch_unwind(AssertUnwindSafe(work));
+            let problem = match ended {
+                Ok(Ok(())) => return,
+                Ok(Err(error)) => error,
+                Err(_) => Error::Device("internal error, please report it".into()),
+            };
+            lock(&inner.outbox).problem = Some(problem);
+            (inner.notify)();
+        });
+        Self { shared, thread: Some(thread) }
+    }
+
+    /// Asks for another picture; what is being made of an earlier still is dropped.
+    pub fn ask(&self, wish: Wish) {
+        let mut inbox = lock(&self.shared.inbox);
+        if inbox.wish.as_deref() == Some(&wish) {
+            return;
+        }
+        inbox.wish = Some(Arc::new(wish));
+        inbox.number += 1;
+        drop(inbox);
+        self.shared.changed.notify_all();
+    }
+
+    /// The last picture.
+    pub fn shown(&self) -> Option<Shown> {
+        lock(&self.shared.outbox).shown.clone()
+    }
+
+    /// What went wrong since it was asked last: [`Error::Parameter`] can be mended, others end the pictures.
+    pub fn problem(&self) -> Option<Error> {
+        lock(&self.shared.outbox).problem.take()
+    }
+}
+
+impl Drop for Painter {
+    fn drop(&mut self) {
+        lock(&self.shared.inbox).closed = true;
+        self.shared.changed.notify_all();
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+/// What the thread has.
+struct Work<'a> {
+    gpu: &'a Gpu,
+    /// One has what the last frame has left behind, the other does not disturb it.
+    moving: Renderer,
+    still: Renderer,
+    resolution: Resolution,
+    /// One is shown while the other is painted.
+    screens: [Option<Arc<Screen>>; 2],
+    count: u64,
+}
+
+impl<'a> Work<'a> {
+    fn new(gpu: &'a Gpu, adapter: Option<&str>) -> Result<Self> {
+        let renderer = || Renderer::new(16, 16, Quality::named("draft")?, adapter);
+        let share = if gpu.info.kind == "cpu" { 0.5 } else { 1.0 };
+        let [moving, still] = [renderer()?, renderer()?];
+        Ok(Self { gpu, moving, still, resolution: Resolution::new(share), screens: [None, None], count: 0 })
+    }
+
+    fn run(&mut self, shared: &Shared) -> Result<()> {
+        let mut done = 0;
+        loop {
+            let Some((wish, number)) = next(shared, done, None) else { return Ok(()) };
+            done = number;
+            self.publish(shared, &wish, number, false)?;
+            // Until something moves again.
+            match next(shared, done, Some(REST)) {
+                None => return Ok(()),
+                Some((_, number)) if number != done => {}
+                Some((wish, number)) => self.publish(shared, &wish, number, true)?,
+            }
+        }
+    }
+
+    /// Makes a picture and shows it. Where the wish cannot be granted, that is said.
+    fn publish(&mut self, shared: &Shared, wish: &Arc<Wish>, number: u64, at_rest: bool) -> Result<()> {
+        let started = Instant::now();
+        let made = match self.paint(shared, wish, number, at_rest) {
+            Err(Error::Interrupted) => return Ok(()),
+            Err(problem @ Error::Parameter(_)) => {
+                lock(&shared.outbox).problem = Some(problem);
+                (shared.notify)();
+                return Ok(());
+            }
+            made => made?,
+        };
+        let (screen, still, timings) = made;
+        let took = started.elapsed();
+        if let (None, Some(wanted)) = (&still, wish.wanted) {
+            self.resolution.learn(took, wanted);
+        }
+        self.count += 1;
+        let shown = Shown { screen, wish: wish.clone(), still, took, timings, count: self.count };
+        lock(&shared.outbox).shown = Some(shown);
+        (shared.notify)();
+        Ok(())
+    }
+
+    fn paint(
+        &mut self,
+        shared: &Shared,
+        wish: &Wish,
+        number: u64,
+        at_rest: bool,
+    ) -> Result<(Arc<Screen>, Option<Arc<Picture>>, Timings)> {
+        let Wish { camera, params, time, .. } = wish;
+        let interrupt = || {
+            let inbox = lock(&shared.inbox);
+            let stale = inbox.closed || (at_rest && inbox.number != number);
+            if stale { Err(Error::Interrupted) } else { Ok(()) }
+        };
+        let size = if at_rest || wish.wanted.is_none() { wish.window } else { self.resolution.of(wish.window) };
+        let screen = self.screen(wish, size)?;
+        if at_rest || wish.sight != Sight::Picture {
+            let quality = if at_rest { &wish.quality } else { &wish.moving_quality };
+            self.still.set(size[0], size[1], quality.clone())?;
+            let layers = wish.sight != Sight::Picture;
+            let picture = self.still.render(camera, params, *time, !layers, layers, None, &interrupt)?;
+            match wish.sight {
+                Sight::Picture => screen.write(self.gpu, &picture.image)?,
+                sight => screen.write_pixels(self.gpu, &pixels_of(sight, &picture))?,
+            }
+            return Ok((screen, Some(Arc::new(picture)), self.still.timings.clone()));
+        }
+        self.moving.set(size[0], size[1], wish.moving_quality.clone())?;
+        self.moving.animate_onto(&screen, camera, params, *time, &interrupt)?;
+        Ok((screen, None, self.moving.timings.clone()))
+    }
+
+    /// The screen that is not shown, made anew where another is wanted.
+    fn screen(&mut self, wish: &Wish, size: [u32; 2]) -> Result<Arc<Screen>> {
+        self.screens.swap(0, 1);
+        let fits = |screen: &&Arc<Screen>| screen.size() == size && screen.look() == (wish.exposure, wish.tone_map);
+        if let Some(screen) = self.screens[0].as_ref().filter(fits) {
+            return Ok(screen.clone());
+        }
+        let screen = Arc::new(Screen::new(self.gpu, size, wish.exposure, wish.tone_map)?);
+        self.screens[0] = Some(screen.clone());
+        Ok(screen)
+    }
+}
+
+/// The wish that is newer than `done`, for which it waits; or after a while the old one; or, at the end, none.
+fn next(shared: &Shared, done: u64, most: Option<Duration>) -> Option<(Arc<Wish>, u64)> {
+    let mut inbox = lock(&shared.inbox);
+    let until = most.map(|most| Instant::now() + most);
+    loop {
+        if inbox.closed {
+            return None;
+        }
+        let left = until.map(|until| until.saturating_duration_since(Instant::now()));
+        if let Some(wish) = inbox.wish.clone().filter(|_| inbox.number != done || left == Some(Duration::ZERO)) {
+            return Some((wish, inbox.number));
+        }
+        inbox = match left {
+            Some(left) => shared.changed.wait_timeout(inbox, left).map_or_else(|e| e.into_inner().0, |(inbox, _)| inbox),
+            None => shared.changed.wait(inbox).unwrap_or_else(PoisonError::into_inner),
+        };
+    }
+}

@@ -1,15 +1,18 @@
 //! The window: one function that reads top to bottom.
 
+use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result};
 use clouds_core::color::{TONE_MAPS, to_srgb8};
+use clouds_core::frame::Frame;
 use clouds_core::{Camera, Error, Gpu, Params, Quality, files};
 use eframe::egui::{self, Key, PointerButton, Sense, Ui, ViewportCommand};
 use eframe::egui_wgpu::RenderState;
 use eframe::wgpu::FilterMode;
+use egui_plot::{Legend, Line, Plot, PlotPoints};
 use glam::DVec3;
 
 use crate::flight::{Controls, Flight};
@@ -18,11 +21,16 @@ use crate::panel::Panel;
 use crate::preset::{self, Shot};
 use crate::sight::Sight;
 use crate::sun::Clock;
+use crate::weather::WeatherPanel;
 
 /// Degrees that a dragged or captured pointer turns the view for each point.
 const TURN: f64 = 0.15;
 /// Longest step of the flight, s: after a hitch nobody is elsewhere at once.
 const LONGEST_STEP: f64 = 0.25;
+/// Pictures whose costs are plotted.
+const COSTS: usize = 120;
+/// When the window is painted again although no picture has come, while anything moves.
+const LONGEST_WAIT: Duration = Duration::from_millis(100);
 /// The methods that the menu offers.
 const QUALITIES: [&str; 3] = ["draft", "balanced", "high"];
 /// Places to be: name, altitude in m, degrees above the horizon.
@@ -63,6 +71,9 @@ pub struct App {
     sight: Sight,
     rate: f64,
     panel: Panel,
+    weather: WeatherPanel,
+    /// What the last pictures cost, by pass.
+    costs: VecDeque<(f64, Vec<(String, f64)>)>,
     captured: bool,
     folder: PathBuf,
     /// What was done last, or went wrong.
@@ -70,6 +81,9 @@ pub struct App {
     shown: Option<Shown>,
     texture: Option<egui::TextureId>,
     last_step: Instant,
+    last_picture: Instant,
+    /// From one picture to the next.
+    intervals: Vec<Duration>,
     leaving: bool,
 }
 
@@ -104,12 +118,16 @@ impl App {
             tone_map: TONE_MAPS[0],
             sight: Sight::Picture,
             panel: Panel::default(),
+            weather: WeatherPanel::default(),
+            costs: VecDeque::new(),
             captured: false,
             folder: std::env::current_dir().unwrap_or_default(),
             notice: String::new(),
             shown: None,
             texture: None,
             last_step: Instant::now(),
+            last_picture: Instant::now(),
+            intervals: Vec::new(),
             leaving: false,
         })
     }
@@ -176,6 +194,12 @@ impl App {
                 }
             }
         }
+        self.costs.push_back((shown.count as f64, shown.timings.0.clone()));
+        if self.costs.len() > COSTS {
+            self.costs.pop_front();
+        }
+        self.intervals.push(self.last_picture.elapsed());
+        self.last_picture = Instant::now();
         self.shown = Some(shown);
     }
 
@@ -296,6 +320,8 @@ impl App {
                 ui.colored_label(ui.visuals().error_fg_color, refused);
             }
             egui::CollapsingHeader::new("time").default_open(true).show(ui, |ui| self.times(ui));
+            egui::CollapsingHeader::new("weather map").show(ui, |ui| self.weather_map(ui));
+            egui::CollapsingHeader::new("cost").show(ui, |ui| self.plot(ui));
             self.panel.sky(ui, &mut self.params);
             let usual = Quality::named(&self.quality_name).unwrap_or_default();
             self.panel.quality(ui, &mut self.quality, &usual);
@@ -305,12 +331,12 @@ impl App {
     /// The clouds' time and that of the day.
     fn times(&mut self, ui: &mut Ui) {
         ui.horizontal(|ui| {
-            ui.toggle_value(&mut self.playing, "▶ wind");
+            ui.toggle_value(&mut self.playing, "wind blows");
             ui.add(egui::DragValue::new(&mut self.time).speed(1.0).suffix(" s"));
         });
         let before = self.clock;
         ui.horizontal(|ui| {
-            ui.toggle_value(&mut self.clock.playing, "▶ sun");
+            ui.toggle_value(&mut self.clock.playing, "sun moves");
             ui.add(egui::Slider::new(&mut self.clock.hour, 0.0..=24.0).suffix(" h").text("hour"));
         });
         ui.add(egui::Slider::new(&mut self.clock.rate, 0.1..=60.0).logarithmic(true).suffix(" h/min").text("rate"));
@@ -320,6 +346,33 @@ impl App {
         if changed {
             self.set_sun();
         }
+    }
+
+    fn weather_map(&mut self, ui: &mut Ui) {
+        let shown = self.shown.as_ref().and_then(|shown| shown.map.as_ref());
+        let map = self.params.weather.map.clone().or_else(|| shown.cloned());
+        let Ok(camera) = self.flight.camera() else { return };
+        let eye = Frame::new(&camera, &self.params, self.time, [1, 1]).weather_origin;
+        self.weather.show(ui, &mut self.params, map.as_ref(), eye);
+    }
+
+    /// Milliseconds on the device of each pass of the last pictures.
+    fn plot(&self, ui: &mut Ui) {
+        let mut names: Vec<&str> = Vec::new();
+        for (name, _) in self.costs.iter().flat_map(|(_, passes)| passes) {
+            if !names.contains(&name.as_str()) {
+                names.push(name);
+            }
+        }
+        let plot = Plot::new("cost").height(180.0).legend(Legend::default()).allow_scroll(false).include_y(0.0);
+        plot.show(ui, |plot| {
+            for name in names {
+                let at = |(count, passes): &(f64, Vec<(String, f64)>)| {
+                    [*count, passes.iter().find(|(pass, _)| pass == name).map_or(0.0, |(_, time)| *time)]
+                };
+                plot.line(Line::new(name, self.costs.iter().map(at).collect::<PlotPoints<'_>>()));
+            }
+        });
     }
 
     fn set_sun(&mut self) {
@@ -374,8 +427,11 @@ impl App {
         if sun_moves {
             self.set_sun();
         }
-        if controls.is_any() || self.flight.is_falling() || self.playing || sun_moves {
-            ui.ctx().request_repaint();
+        let weather_changes = self.weather.step(&mut self.params, seconds);
+        if controls.is_any() || self.flight.is_falling() || self.playing || sun_moves || weather_changes {
+            // The next picture repaints the window. To do it as often as one can would leave a processor that draws both
+            // no time for pictures.
+            ui.ctx().request_repaint_after(LONGEST_WAIT);
         }
     }
 
@@ -460,6 +516,7 @@ impl App {
             return;
         }
         self.leaving = true;
+        self.print_intervals();
         let Some(path) = self.start.screenshot.clone() else {
             ui.ctx().send_viewport_cmd(ViewportCommand::Close);
             return;
@@ -472,6 +529,17 @@ impl App {
             }
             context.send_viewport_cmd(ViewportCommand::Close);
         });
+    }
+
+    /// What a recorded flight took: the first pictures compile and bake, and are left out.
+    fn print_intervals(&self) {
+        let mut milliseconds: Vec<_> = self.intervals.iter().skip(3).map(|time| 1e3 * time.as_secs_f64()).collect();
+        milliseconds.sort_by(f64::total_cmp);
+        let share = |share: f64| milliseconds.get((share * (milliseconds.len() as f64 - 1.0)).round() as usize);
+        if let (Some(median), Some(slow), Some(worst)) = (share(0.5), share(0.95), share(1.0)) {
+            let [width, height] = self.shown.as_ref().map_or([0, 0], |shown| shown.screen.size());
+            println!("ms from picture to picture: median {median:.0}, 95 % {slow:.0}, worst {worst:.0}; {width} x {height} pixels");
+        }
     }
 
     /// Puts the visitor elsewhere.

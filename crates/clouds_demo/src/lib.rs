@@ -10,3 +10,4 @@ pub mod preset;
 pub mod resolution;
 pub mod sight;
 pub mod sun;
+pub mod weather;

@@ -6,7 +6,9 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use clouds_core::gpu::Timings;
+use clouds_core::params::Weather;
 use clouds_core::renderer::Picture;
+use clouds_core::schema::Map;
 use clouds_core::{Camera, Error, Gpu, Params, Quality, Renderer, Result, Screen};
 
 use crate::resolution::Resolution;
@@ -53,6 +55,8 @@ pub struct Shown {
     pub took: Duration,
     /// Where the time went on the device.
     pub timings: Timings,
+    /// The weather map that was in the sky when it was last at rest.
+    pub map: Option<Arc<Map>>,
     /// How many pictures there have been.
     pub count: u64,
 }
@@ -154,6 +158,8 @@ struct Work<'a> {
     resolution: Resolution,
     /// One is shown while the other is painted.
     screens: [Option<Arc<Screen>>; 2],
+    /// The last weather map, and whose it is.
+    map: Option<(Weather, Arc<Map>)>,
     count: u64,
 }
 
@@ -162,7 +168,7 @@ impl<'a> Work<'a> {
         let renderer = || Renderer::new(16, 16, Quality::named("draft")?, adapter);
         let share = if gpu.info.kind == "cpu" { 0.5 } else { 1.0 };
         let [moving, still] = [renderer()?, renderer()?];
-        Ok(Self { gpu, moving, still, resolution: Resolution::new(share), screens: [None, None], count: 0 })
+        Ok(Self { gpu, moving, still, resolution: Resolution::new(share), screens: [None, None], map: None, count: 0 })
     }
 
     fn run(&mut self, shared: &Shared) -> Result<()> {
@@ -194,11 +200,12 @@ impl<'a> Work<'a> {
         };
         let (screen, still, timings) = made;
         let took = started.elapsed();
+        let map = self.map.as_ref().map(|(_, map)| map.clone());
         if let (None, Some(wanted)) = (&still, wish.wanted) {
             self.resolution.learn(took, wanted);
         }
         self.count += 1;
-        let shown = Shown { screen, wish: wish.clone(), still, took, timings, count: self.count };
+        let shown = Shown { screen, wish: wish.clone(), still, took, timings, map, count: self.count };
         lock(&shared.outbox).shown = Some(shown);
         (shared.notify)();
         Ok(())
@@ -228,11 +235,25 @@ impl<'a> Work<'a> {
                 Sight::Picture => screen.write(self.gpu, &picture.image)?,
                 sight => screen.write_pixels(self.gpu, &pixels_of(sight, &picture))?,
             }
-            return Ok((screen, Some(Arc::new(picture)), self.still.timings.clone()));
+            let timings = self.still.timings.clone();
+            if at_rest {
+                self.look_at_weather(params, &interrupt)?;
+            }
+            return Ok((screen, Some(Arc::new(picture)), timings));
         }
         self.moving.set(size[0], size[1], wish.moving_quality.clone())?;
         self.moving.animate_onto(&screen, camera, params, *time, &interrupt)?;
         Ok((screen, None, self.moving.timings.clone()))
+    }
+
+    /// Fetches the weather map if it is another; while weathers go over into each other, it would be in every frame.
+    fn look_at_weather(&mut self, params: &Params, interrupt: &dyn Fn() -> Result<()>) -> Result<()> {
+        if self.map.as_ref().is_none_or(|(weather, _)| *weather != params.weather) {
+            let ([width, height], data) = self.still.weather_map(params, interrupt)?;
+            let map = Map { width: width as usize, height: height as usize, channels: 3, data };
+            self.map = Some((params.weather.clone(), Arc::new(map)));
+        }
+        Ok(())
     }
 
     /// The screen that is not shown, made anew where another is wanted.

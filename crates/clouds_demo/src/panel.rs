@@ -82,7 +82,7 @@ fn row(ui: &mut Ui, block: &str, field: &Field, value: &mut Value, usual: &Value
         response.on_hover_text(format!("{block}.{}\n{}{unit}\n{}", field.name, field.doc.trim(), field.allowed()))
     };
     ui.horizontal(|ui| {
-        let back = ui.add_enabled(value != usual, egui::Button::new("⟲").small());
+        let back = ui.add_enabled(value != usual, egui::Button::new("×").small());
         if back.on_hover_text(format!("back to {usual}")).clicked() {
             *value = usual.clone();
         }

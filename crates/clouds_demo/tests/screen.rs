@@ -1,0 +1,127 @@
+//! What reaches a screen is what reaches memory; and frames whose size changes go on.
+
+use std::sync::Arc;
+
+use clouds_core::color::{TONE_MAPS, to_srgb8};
+use clouds_core::{Camera, Gpu, Params, Quality, Renderer, Screen, wgpu};
+use clouds_demo::preset;
+use glam::DVec3;
+
+fn adapter() -> Option<String> {
+    std::env::var("NUBIS_ADAPTER").ok()
+}
+
+fn renderer(width: u32, height: u32) -> Renderer {
+    Renderer::new(width, height, Quality::named("draft").expect("is one"), adapter().as_deref()).expect("opens")
+}
+
+/// The bytes of a screen whose rows are whole multiples of 256 bytes.
+fn read(gpu: &Gpu, screen: &Screen) -> Vec<u8> {
+    let (_, _, device, queue) = gpu.shared();
+    let texture = screen.view().texture();
+    let [width, height] = screen.size();
+    let staging = device.create_buffer(&wgpu::BufferDescriptor {
+        label: None,
+        size: u64::from(4 * width * height),
+        usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
+    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(4 * width), rows_per_image: Some(height) };
+    let target = wgpu::TexelCopyBufferInfo { buffer: &staging, layout };
+    encoder.copy_texture_to_buffer(texture.as_image_copy(), target, texture.size());
+    queue.submit([encoder.finish()]);
+    staging.map_async(wgpu::MapMode::Read, .., |_| {});
+    device.poll(wgpu::PollType::wait_indefinitely()).expect("is done");
+    staging.get_mapped_range(..).expect("is mapped").to_vec()
+}
+
+fn shot(i: u32) -> (Camera, Params, f64) {
+    let (_, camera, params) = preset::scenes().expect("are read").swap_remove(0);
+    let eye = camera.eye + DVec3::new(3.0 * f64::from(i), 0.0, 0.0);
+    (Camera { eye, ..camera }, params, f64::from(i) / 24.0)
+}
+
+#[test]
+fn a_screen_shows_what_memory_gets() {
+    for (tone_map, exposure) in TONE_MAPS.into_iter().zip([0.0, 1.5, -2.0]) {
+        let [mut one, mut other] = [renderer(64, 40), renderer(64, 40)];
+        let gpu: Arc<Gpu> = one.gpu().clone();
+        let screen = Screen::new(&gpu, [64, 40], exposure, tone_map).expect("is made");
+        for i in 0..3 {
+            let (camera, params, time) = shot(i);
+            one.animate_onto(&screen, &camera, &params, time, &|| Ok(())).expect("is painted");
+            let image = other.animate(&camera, &params, time, true, None, &|| Ok(())).expect("is made");
+            let expected = to_srgb8(&image, 4, exposure, tone_map).expect("is shown");
+            let got = read(&gpu, &screen);
+            let most = got.iter().zip(&expected).map(|(a, b)| a.abs_diff(*b)).max();
+            assert!(most <= Some(1), "{tone_map}, frame {i}: {most:?} levels");
+            assert!(got.iter().any(|v| *v > 100) && got.chunks(4).any(|p| p[2] > p[0]));
+        }
+    }
+}
+
+#[test]
+fn screens_of_another_size_are_refused() {
+    let mut renderer = renderer(64, 40);
+    let screen = Screen::new(&renderer.gpu().clone(), [64, 41], 0.0, "agx").expect("is made");
+    let (camera, params, time) = shot(0);
+    let error = renderer.animate_onto(&screen, &camera, &params, time, &|| Ok(())).expect_err("does not fit");
+    assert!(error.to_string().contains("64 x 41"), "{error}");
+    assert!(Screen::new(renderer.gpu(), [64, 40], 0.0, "best").is_err());
+}
+
+/// Relative RMSE of radiance.
+fn error(got: &[f32], expected: &[f32]) -> f64 {
+    let square = |a: f32, b: f32| f64::from(a - b).powi(2);
+    let off: f64 = got.iter().zip(expected).map(|(a, b)| square(*a, *b)).sum();
+    (off / expected.iter().map(|v| square(*v, 0.0)).sum::<f64>()).sqrt()
+}
+
+/// A picture in another size, linear between its pixels.
+fn stretch(image: &[f32], [w, h]: [u32; 2], [width, height]: [u32; 2]) -> Vec<f32> {
+    let place = |i: u32, of: u32, had: u32| {
+        let at = ((i as f32 + 0.5) * had as f32 / of as f32 - 0.5).clamp(0.0, had as f32 - 1.0);
+        (at as u32, (at as u32 + 1).min(had - 1), at.fract())
+    };
+    let mut stretched = Vec::new();
+    for y in 0..height {
+        let (y0, y1, fy) = place(y, height, h);
+        for x in 0..width {
+            let (x0, x1, fx) = place(x, width, w);
+            for c in 0..4 {
+                let at = |x: u32, y: u32| image[(4 * (y * w + x) + c) as usize];
+                let row = |y| at(x0, y) * (1.0 - fx) + at(x1, y) * fx;
+                stretched.push(row(y0) * (1.0 - fy) + row(y1) * fy);
+            }
+        }
+    }
+    stretched
+}
+
+#[test]
+fn an_animation_goes_on_in_another_size() {
+    let make = |renderer: &mut Renderer, i| {
+        let (camera, params, time) = shot(i);
+        renderer.animate(&camera, &params, time, true, None, &|| Ok(())).expect("is made")
+    };
+    for sizes in [[(96, 56), (192, 112)], [(192, 112), (144, 84)]] {
+        let [(w, h), (width, height)] = sizes;
+        let mut animated = renderer(w, h);
+        for i in 0..17 {
+            make(&mut animated, i);
+        }
+        animated.set(width, height, Quality::named("draft").expect("is one")).expect("is allowed");
+        let got = make(&mut animated, 17);
+        let fresh = make(&mut renderer(width, height), 17);
+        let off = error(&got, &fresh);
+        // What a still of the old size knows of the new one, between its pixels.
+        let old = make(&mut renderer(w, h), 17);
+        let stretched = stretch(&old, [w, h], [width, height]);
+        let most = error(&stretched, &fresh);
+        // The history is that and a sixteenth of fresh pixels; without, it would be a guess between those.
+        assert!(off < 1.25 * most && most < 0.25, "{sizes:?}: {off}, stretched {most}");
+        // No still is made instead: that would be a hitch.
+        assert!(off > 0.2 * most, "{sizes:?}: {off}, stretched {most}");
+    }
+}

@@ -211,7 +211,11 @@ impl Gpu {
         let reported = failure.clone();
         // Without this wgpu panics on the first error.
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
-            lock(&reported).error.get_or_insert_with(|| error.to_string());
+            // A window's own business (`Gpu::shared`): its surface cannot be made anew while we keep the device busy, and is
+            // as soon as we do not.
+            if !error.to_string().contains("In Surface::") {
+                lock(&reported).error.get_or_insert_with(|| error.to_string());
+            }
         }));
         let reported = failure.clone();
         device.set_device_lost_callback(move |reason, message| {

@@ -27,6 +27,8 @@ use crate::weather::WeatherPanel;
 const TURN: f64 = 0.15;
 /// Longest step of the flight, s: after a hitch nobody is elsewhere at once.
 const LONGEST_STEP: f64 = 0.25;
+/// Width of the panel, points.
+const PANEL: f32 = 360.0;
 /// Pictures whose costs are plotted.
 const COSTS: usize = 120;
 /// When the window is painted again although no picture has come, while anything moves.
@@ -78,6 +80,8 @@ pub struct App {
     folder: PathBuf,
     /// What was done last, or went wrong.
     notice: String,
+    /// What is wished for.
+    asked: Option<Wish>,
     shown: Option<Shown>,
     texture: Option<egui::TextureId>,
     last_step: Instant,
@@ -123,6 +127,7 @@ impl App {
             captured: false,
             folder: std::env::current_dir().unwrap_or_default(),
             notice: String::new(),
+            asked: None,
             shown: None,
             texture: None,
             last_step: Instant::now(),
@@ -154,11 +159,12 @@ impl App {
 
     /// One frame of the window.
     pub fn frame(&mut self, ui: &mut Ui, device: Option<&RenderState>) {
+        Self::leave_when_asked(ui);
         self.receive(ui, device);
         self.read_dropped_files(ui);
         egui::Panel::top("top").show(ui, |ui| self.menu(ui));
         egui::Panel::bottom("status").show(ui, |ui| self.status(ui));
-        egui::Panel::left("panel").default_size(330.0).show(ui, |ui| self.settings(ui));
+        egui::Panel::left("panel").resizable(false).exact_size(PANEL).show(ui, |ui| self.settings(ui));
         let view = egui::CentralPanel::no_frame().show(ui, |ui| self.view(ui)).inner;
         self.go_on(ui, &view);
         self.ask(ui, view.rect);
@@ -201,6 +207,12 @@ impl App {
         self.intervals.push(self.last_picture.elapsed());
         self.last_picture = Instant::now();
         self.shown = Some(shown);
+    }
+
+    fn leave_when_asked(ui: &Ui) {
+        if ui.input_mut(|input| input.consume_key(egui::Modifiers::COMMAND, Key::Q)) {
+            ui.ctx().send_viewport_cmd(ViewportCommand::Close);
+        }
     }
 
     fn read_dropped_files(&mut self, ui: &Ui) {
@@ -280,7 +292,8 @@ impl App {
 
     /// Writes the still that is shown.
     fn save_picture(&self) -> Result<PathBuf> {
-        let shown = self.shown.as_ref().filter(|shown| shown.wish.sight == Sight::Picture);
+        let shown = self.shown.as_ref().filter(|shown| self.asked.as_ref() == Some(&*shown.wish));
+        let shown = shown.filter(|shown| shown.wish.sight == Sight::Picture);
         let still = shown.and_then(|shown| Some((shown, shown.still.as_ref()?)));
         let (shown, picture) = still.context("hold still until the picture is at its best, then save it")?;
         let (size, wish) = (shown.screen.size().map(|side| side as usize), &shown.wish);
@@ -454,6 +467,8 @@ impl App {
     fn controls(&mut self, ui: &Ui, view: &egui::Response) -> Controls {
         let mut controls = Controls::default();
         let typing = ui.ctx().egui_wants_keyboard_input();
+        // Asked before: what is asked for within `input` waits for itself.
+        let (dragged, hovered) = (view.dragged_by(PointerButton::Primary).then(|| view.drag_delta()), view.hovered());
         ui.input(|input| {
             if !typing {
                 let axis = |plus, minus| f64::from(input.key_down(plus)) - f64::from(input.key_down(minus));
@@ -467,13 +482,11 @@ impl App {
             }
             let turned = if self.captured {
                 input.pointer.motion().unwrap_or_default()
-            } else if view.dragged_by(PointerButton::Primary) {
-                -view.drag_delta()
             } else {
-                egui::Vec2::ZERO
+                -dragged.unwrap_or_default()
             };
             controls.look = [TURN * f64::from(turned.x), -TURN * f64::from(turned.y)];
-            if self.captured || view.hovered() {
+            if self.captured || hovered {
                 controls.wheel = f64::from(input.smooth_scroll_delta().y) / 50.0;
             }
         });
@@ -495,7 +508,7 @@ impl App {
                 return;
             }
         };
-        self.painter.ask(Wish {
+        let wish = Wish {
             camera,
             params: self.params.clone(),
             time: self.time,
@@ -506,7 +519,9 @@ impl App {
             tone_map: self.tone_map,
             wanted: Some(Duration::from_secs_f64(1.0 / self.rate)),
             sight: self.sight,
-        });
+        };
+        self.painter.ask(wish.clone());
+        self.asked = Some(wish);
     }
 
     /// After as many pictures as were asked for, perhaps with a picture of the window.

@@ -11,7 +11,7 @@ use eframe::egui::ViewportBuilder;
 use eframe::egui_wgpu::{WgpuConfiguration, WgpuSetup, WgpuSetupExisting};
 
 /// Fly through clouds. W A S D move, Q and E go down and up, F lands and takes off, Space jumps, Shift is fast, Control slow,
-/// the wheel sets the speed; drag to look around, or click to take the pointer and press Esc to give it back.
+/// the wheel sets the speed, Control and Q leave; drag to look around, or click to take the pointer and press Esc to give it back.
 #[derive(Parser)]
 struct Arguments {
     /// A scene, such as fair_weather or storm, or a TOML file

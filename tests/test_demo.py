@@ -1,0 +1,233 @@
+"""The window, tried as by a user: on a display of its own, with keys and mouse."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tomli_w
+
+import nubis
+from nubis import _nubis
+
+ROOT = Path(__file__).parent.parent
+DEMO = ROOT / "target" / "release" / "clouds_demo"
+SCENES = ROOT / "crates" / "clouds_demo" / "src" / "scenes.toml"
+TOOLS = "Xvfb", "xdotool", "xclip"
+#: Where the view begins, and its size, in a window of 1280 x 720.
+CORNER, VIEW = (360, 48), (920, 647)
+PATIENCE = 120.0
+
+needs_display = pytest.mark.skipif(
+    not DEMO.exists() or any(shutil.which(tool) is None for tool in TOOLS),
+    reason="clouds_demo is not built, or Xvfb, xdotool or xclip is missing",
+)
+
+
+def test_scenes_are_those_of_the_package():
+    usual = nubis.Params().to_dict()
+    wanted = {}
+    for name, (camera, params) in nubis.scenes.items():
+        scene = {
+            "camera": {
+                "eye": list(camera.eye),
+                "forward": list(camera.forward),
+                "fov_y": camera.fov,
+            }
+        }
+        for block, fields in params.to_dict().items():
+            changes = {k: v for k, v in fields.items() if v != usual[block][k]}
+            if changes:
+                scene[block] = changes
+        wanted[name] = scene
+    text = tomli_w.dumps(wanted)
+    if os.environ.get("UPDATE"):
+        SCENES.write_text(text)
+    assert SCENES.read_text() == text, "UPDATE=1 writes it anew"
+
+
+@pytest.fixture(scope="module")
+def display():
+    command = ["Xvfb", "-displayfd", "1", "-screen", "0", "1280x800x24", "-nolisten", "tcp"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as server:
+        assert server.stdout is not None
+        number = server.stdout.readline().decode().strip()
+        yield f":{number}"
+        server.terminate()
+
+
+class Window:
+    """A demo that runs in a folder, and the hands of a user."""
+
+    def __init__(self, display: str, folder: Path, *arguments: str) -> None:
+        self.environment = os.environ | {"DISPLAY": display}
+        self.environment.setdefault("XDG_RUNTIME_DIR", str(folder))
+        self.folder = folder
+        self.process = subprocess.Popen(
+            [DEMO, *arguments],
+            cwd=folder,
+            env=self.environment,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+
+    def __enter__(self) -> Window:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.process.kill()
+        _, errors = self.process.communicate()
+        print(errors)
+
+    def do(self, *arguments: object) -> str:
+        words = ["xdotool", *map(str, arguments)]
+        found = subprocess.run(
+            words, env=self.environment, check=True, capture_output=True, text=True, timeout=60
+        )
+        return found.stdout
+
+    def appear(self) -> str:
+        window = self.do("search", "--sync", "--name", "^nubis$").split()[0]
+        self.do("windowfocus", window)
+        return window
+
+    def click(self, x: int, y: int) -> None:
+        self.do("mousemove", x, y)
+        self.do("mousedown", 1)
+        time.sleep(0.3)
+        self.do("mouseup", 1)
+        time.sleep(0.3)
+
+    def drag(self, x: int, y: int, dx: int, dy: int) -> None:
+        self.do("mousemove", x, y, "mousedown", 1)
+        for _ in range(8):
+            time.sleep(0.1)
+            self.do("mousemove_relative", "--", dx // 8, dy // 8)
+        self.do("mouseup", 1)
+
+    def save(self) -> Path:
+        """The picture at rest: until it is, the button says so and saves nothing."""
+        before = set(self.folder.glob("sky*.png"))
+        started = time.monotonic()
+        while time.monotonic() < started + PATIENCE:
+            self.click(65, 35)
+            new = set(self.folder.glob("sky*.png")) - before
+            if new:
+                time.sleep(0.5)
+                return new.pop()
+            time.sleep(1)
+        raise AssertionError("no picture was saved")
+
+    def code(self) -> str:
+        self.click(241, 35)
+        time.sleep(1)
+        command = ["xclip", "-o", "-selection", "clipboard"]
+        return subprocess.run(
+            command, env=self.environment, check=True, capture_output=True, text=True, timeout=10
+        ).stdout
+
+    def leave(self, window: str) -> None:
+        self.do("windowfocus", window, "key", "ctrl+q")
+        _, errors = self.process.communicate(timeout=PATIENCE)
+        assert self.process.returncode == 0, errors
+        assert "panicked" not in errors
+
+
+def pixels(path: Path) -> np.ndarray:
+    return np.rint(255 * np.asarray(_nubis.read_pixels(path))[..., :3])
+
+
+def off(got: np.ndarray, expected: np.ndarray) -> float:
+    """Relative RMSE."""
+    return float(np.sqrt(((got - expected) ** 2).mean() / (expected**2).mean()))
+
+
+@needs_display
+def test_frames_and_a_screenshot(display, tmp_path):
+    """The view is the picture of the library, and the window leaves by itself."""
+    arguments = "--frames", "2", "--screenshot", "window.png"
+    with Window(display, tmp_path, *arguments) as demo:
+        _, errors = demo.process.communicate(timeout=PATIENCE)
+        assert demo.process.returncode == 0, errors
+    got = pixels(tmp_path / "window.png")
+    assert got.shape == (720, 1280, 3)
+    frame = nubis.Renderer(*VIEW).render(*nubis.scenes["fair_weather"])
+    expected = nubis.to_srgb8(frame)[..., :3].astype(np.float64)
+    view = got[CORNER[1] : CORNER[1] + VIEW[1], CORNER[0] : CORNER[0] + VIEW[0]]
+    assert off(view, expected) < 0.01
+    # The panel beside it is dark, with bright words.
+    panel = got[60:690, :350]
+    assert np.median(panel) < 60 < panel.max()
+
+
+@needs_display
+def test_a_user_flies_paints_saves_and_goes_on_in_python(display, tmp_path, monkeypatch):
+    with Window(display, tmp_path) as demo:
+        window = demo.appear()
+        first = demo.save()
+        # Into the sky, with a look to the right.
+        demo.do("mousemove", 700, 400, "keydown", "w")
+        time.sleep(2)
+        demo.do("keyup", "w")
+        demo.drag(700, 400, -160, 40)
+        second = demo.save()
+        assert off(pixels(second), pixels(first)) > 0.1
+        # Another time of the day.
+        demo.click(190, 129)
+        evening = demo.save()
+        assert off(pixels(evening), pixels(second)) > 0.03
+        lines = demo.code()
+        assert '"sun.elevation"' in lines
+        # Weather by hand.
+        demo.click(64, 221)
+        demo.drag(120, 400, 80, 40)
+        painted = demo.save()
+        assert off(pixels(painted), pixels(evening)) > 0.01
+        code = demo.code()
+        assert "nubis.Params.load(" in code
+        demo.leave(window)
+
+    monkeypatch.chdir(tmp_path)
+    for picture, text in (evening, lines), (painted, code):
+        exec(text, {})
+        assert off(pixels(tmp_path / "sky.png"), pixels(picture)) < 0.02
+    linear = nubis.Params.load(next(tmp_path.glob("*.toml")))
+    assert linear.weather.map is not None
+
+
+@needs_display
+def test_a_window_is_resized_and_small_and_closed_in_the_middle_of_a_picture(display, tmp_path):
+    with Window(display, tmp_path, "--scene", "storm") as demo:
+        window = demo.appear()
+        for size in (900, 500), (400, 200), (1280, 720):
+            demo.do("windowsize", window, *size)
+            time.sleep(0.7)
+        demo.do("windowunmap", window)
+        time.sleep(0.5)
+        demo.do("windowmap", window)
+        demo.do("windowfocus", window, "keydown", "w")
+        time.sleep(0.5)
+        demo.do("keyup", "w")
+        demo.leave(window)
+
+
+def test_bad_arguments_are_refused_by_name():
+    if not DEMO.exists():
+        pytest.skip("clouds_demo is not built")
+    for arguments, named in (
+        (["--size", "12"], "--size"),
+        (["--rate", "0"], "--rate"),
+        (["--screenshot", "x.png"], "--frames"),
+        (["--adapter", "no such adapter"], "no adapter matches"),
+    ):
+        result = subprocess.run(
+            [DEMO, *arguments], capture_output=True, text=True, timeout=60, check=False
+        )
+        assert result.returncode != 0 and named in result.stderr, result.stderr
+        assert "panicked" not in result.stderr

@@ -12,7 +12,7 @@ export VIRTUAL_ENV := $(CURDIR)/$(VENV)
 unexport CONDA_PREFIX
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help setup build generate render gallery test stress types lint bench bench-kernels heat profile soak clean
+.PHONY: help setup build generate render gallery demo window test stress types lint bench bench-kernels heat profile soak clean
 
 help: ## List the commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -59,8 +59,26 @@ gallery: build ## Render the pictures of the README and of docs/clouds.md into d
 	$(BIN)/python -m nubis render --all --size 640x360 --out docs/images
 	$(BIN)/python -m docs.gallery
 
-test: types ## Run all tests; needs no GPU
+demo: setup ## Open a window to fly through the clouds
+	cargo run --release -p clouds_demo
+
+# A display without a screen, with hands: for the tests of the demo. Without apt they are left out.
+window: setup
+	@missing=(); \
+	for tool in Xvfb xdotool xclip; do command -v $$tool > /dev/null || missing+=($${tool,,}); done; \
+	for library in libX11-xcb.so.1:libx11-xcb1 libXcursor.so.1:libxcursor1 libXi.so.6:libxi6 \
+	    libxkbcommon-x11.so.0:libxkbcommon-x11-0; do \
+	    /sbin/ldconfig -p 2> /dev/null | grep -q "$${library%%:*} " || missing+=($${library#*:}); \
+	done; \
+	if [[ $${#missing[@]} == 0 ]] || ! command -v apt-get > /dev/null; then exit; fi; \
+	echo "Installing $${missing[*]}"; \
+	run=(env DEBIAN_FRONTEND=noninteractive); [[ $$EUID == 0 ]] || run=(sudo "$${run[@]}"); \
+	"$${run[@]}" apt-get update -qq && \
+	"$${run[@]}" apt-get install -qq --no-install-recommends "$${missing[@]}" > /dev/null
+
+test: types window ## Run all tests; needs no GPU
 	cargo test --release
+	cargo test --release -p clouds_demo
 	$(BIN)/python -m pytest
 
 # EXAMPLES=2000 SEED=3 runs a slice. Pictures of skies at the ends of all ranges: half an hour on two cores.

@@ -480,11 +480,8 @@ impl App {
                     self.flight.switch();
                 }
             }
-            let turned = if self.captured {
-                input.pointer.motion().unwrap_or_default()
-            } else {
-                -dragged.unwrap_or_default()
-            };
+            let turned =
+                if self.captured { input.pointer.motion().unwrap_or_default() } else { -dragged.unwrap_or_default() };
             controls.look = [TURN * f64::from(turned.x), -TURN * f64::from(turned.y)];
             if self.captured || hovered {
                 controls.wheel = f64::from(input.smooth_scroll_delta().y) / 50.0;
@@ -553,7 +550,9 @@ impl App {
         let share = |share: f64| milliseconds.get((share * (milliseconds.len() as f64 - 1.0)).round() as usize);
         if let (Some(median), Some(slow), Some(worst)) = (share(0.5), share(0.95), share(1.0)) {
             let [width, height] = self.shown.as_ref().map_or([0, 0], |shown| shown.screen.size());
-            println!("ms from picture to picture: median {median:.0}, 95 % {slow:.0}, worst {worst:.0}; {width} x {height} pixels");
+            println!(
+                "ms from picture to picture: median {median:.0}, 95 % {slow:.0}, worst {worst:.0}; {width} x {height} pixels"
+            );
         }
     }
 

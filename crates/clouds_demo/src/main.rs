@@ -66,7 +66,10 @@ fn run(arguments: Arguments) -> Result<()> {
     let (instance, adapter, device, queue) = gpu.shared();
     let setup = WgpuSetup::Existing(WgpuSetupExisting { instance, adapter, device, queue });
     let options = eframe::NativeOptions {
-        viewport: ViewportBuilder::default().with_title("nubis").with_inner_size(arguments.size).with_drag_and_drop(true),
+        viewport: ViewportBuilder::default()
+            .with_title("nubis")
+            .with_inner_size(arguments.size)
+            .with_drag_and_drop(true),
         wgpu_options: WgpuConfiguration { wgpu_setup: setup, ..Default::default() },
         ..Default::default()
     };

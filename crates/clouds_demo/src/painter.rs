@@ -282,7 +282,9 @@ fn next(shared: &Shared, done: u64, most: Option<Duration>) -> Option<(Arc<Wish>
             return Some((wish, inbox.number));
         }
         inbox = match left {
-            Some(left) => shared.changed.wait_timeout(inbox, left).map_or_else(|e| e.into_inner().0, |(inbox, _)| inbox),
+            Some(left) => {
+                shared.changed.wait_timeout(inbox, left).map_or_else(|e| e.into_inner().0, |(inbox, _)| inbox)
+            }
             None => shared.changed.wait(inbox).unwrap_or_else(PoisonError::into_inner),
         };
     }

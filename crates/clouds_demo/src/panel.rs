@@ -100,9 +100,7 @@ fn widget(ui: &mut Ui, field: &Field, value: &mut Value) -> egui::Response {
         (Type::F32, Value::Float(v)) => {
             ui.add(Slider::new(v, min..=max).logarithmic(wide).suffix(suffix).max_decimals(6))
         }
-        (Type::U32, Value::Int(v)) => {
-            ui.add(Slider::new(v, min as i64..=max as i64).logarithmic(wide).suffix(suffix))
-        }
+        (Type::U32, Value::Int(v)) => ui.add(Slider::new(v, min as i64..=max as i64).logarithmic(wide).suffix(suffix)),
         (Type::Bool, Value::Bool(v)) => ui.checkbox(v, ""),
         (Type::Choice(names), Value::Text(v)) => {
             let combo = egui::ComboBox::from_id_salt(field.name).selected_text(v.clone());
@@ -124,7 +122,8 @@ fn widget(ui: &mut Ui, field: &Field, value: &mut Value) -> egui::Response {
         }
         (Type::Vector(_), Value::Vector(v)) => {
             let number = |v| egui::DragValue::new(v).range(min..=max).speed(((max - min) / 1e4).clamp(1e-3, 100.0));
-            ui.horizontal(|ui| v.iter_mut().map(|v| ui.add(number(v))).reduce(|a, b| a | b)).inner
+            ui.horizontal(|ui| v.iter_mut().map(|v| ui.add(number(v))).reduce(|a, b| a | b))
+                .inner
                 .unwrap_or_else(|| ui.label("–"))
         }
         (Type::Map(_), Value::Map(map)) => ui.label(format!("{} x {}", map.width, map.height)),

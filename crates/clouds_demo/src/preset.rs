@@ -82,7 +82,8 @@ fn fill(block: &mut dyn Block, path: &str, fields: &Table) -> Result<()> {
 }
 
 fn grid(fields: &Table) -> Result<DensityGrid> {
-    let (Some(Toml::Array(slices)), Some(Toml::Array(bounds))) = (fields.get("extinction"), fields.get("bounds")) else {
+    let (Some(Toml::Array(slices)), Some(Toml::Array(bounds))) = (fields.get("extinction"), fields.get("bounds"))
+    else {
         bail!("volume must have extinction and bounds");
     };
     let slices: Vec<_> = slices.iter().map(|slice| numbers(slice, 2)).collect::<Result<_>>()?;

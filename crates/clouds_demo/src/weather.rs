@@ -74,7 +74,8 @@ impl WeatherPanel {
     pub fn show(&mut self, ui: &mut Ui, params: &mut Params, map: Option<&Arc<Map>>, eye: [f32; 2]) {
         ui.horizontal(|ui| {
             if ui.button("New weather").on_hover_text("another seed, which comes gradually").clicked() {
-                self.change = Some(Change { from: params.weather.clone(), gone: 0.0, takes: *self.seconds.get_or_insert(30.0) });
+                self.change =
+                    Some(Change { from: params.weather.clone(), gone: 0.0, takes: *self.seconds.get_or_insert(30.0) });
                 params.weather.seed = params.weather.seed.wrapping_add(1);
                 params.weather.map = None;
                 self.step(params, 0.0);
@@ -172,7 +173,8 @@ mod tests {
     fn a_new_weather_comes_gradually() {
         let mut params = Params::default();
         let from = params.weather.clone();
-        let mut panel = WeatherPanel { change: Some(Change { from, gone: 0.0, takes: 10.0 }), ..WeatherPanel::default() };
+        let mut panel =
+            WeatherPanel { change: Some(Change { from, gone: 0.0, takes: 10.0 }), ..WeatherPanel::default() };
         params.weather.seed += 1;
         assert!(panel.step(&mut params, 2.5));
         assert_eq!(params.weather_mix[0].1, 0.75);

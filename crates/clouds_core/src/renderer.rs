@@ -16,7 +16,7 @@ use crate::gpu::{Gpu, Interrupt, Timings, Work, check_fork};
 use crate::kernel::{Binding, Kernel, Variant, Wanted};
 use crate::params::{self, Model, Params, Quality};
 use crate::passes::broad_weather::BroadWeather;
-use crate::passes::composite::Composed;
+use crate::passes::composite::{Backdrop, Composed};
 use crate::passes::high_clouds::{self, HighClouds};
 use crate::passes::majorant::Majorants;
 use crate::passes::march::Marched;
@@ -49,6 +49,7 @@ pub struct Renderer {
     refining: Option<Refining>,
     march_pace: Pace,
     reproject_pace: Pace,
+    cell_pace: Pace,
     pixel_pace: Pace,
     shadow_pace: Pace,
     /// Milliseconds on the GPU by kernel, for the last picture or answer.
@@ -153,6 +154,7 @@ struct Animation {
     before: Marched,
     now: Marched,
     composed: Composed,
+    backdrop: Backdrop,
     scene_before: SceneTextures,
     last: Option<Shot>,
 }
@@ -191,6 +193,7 @@ impl Renderer {
             refining: None,
             march_pace: pace,
             reproject_pace: pace,
+            cell_pace: pace,
             pixel_pace: pace,
             // Its texels may take many times as long as a pixel's march.
             shadow_pace: Pace::new(if gpu.info.kind == "cpu" { 1e4 } else { 1e6 }),
@@ -214,8 +217,9 @@ impl Renderer {
             add("still", [marched.bindings(), refined.bindings(), composed.bindings()].concat());
             add("still", rays.as_ref().map_or(Vec::new(), |rays| rays.bindings("rays")));
         }
-        if let Some(Animation { refined, fresh, before, now, composed, scene_before, .. }) = &self.animation {
+        if let Some(Animation { refined, fresh, before, now, composed, backdrop, scene_before, .. }) = &self.animation {
             add("animation", [fresh.bindings(), refined.bindings(), composed.bindings()].concat());
+            add("animation", backdrop.bindings());
             add("animation", vec![("scene_before", scene_before.depth())]);
             add("animation", [before.bindings(), now.bindings()].concat());
         }
@@ -395,6 +399,7 @@ impl Renderer {
             before: Marched::new(gpu, pixels),
             now: Marched::new(gpu, pixels),
             composed: Composed::new(gpu, pixels),
+            backdrop: Backdrop::new(gpu, [width, height]),
             scene_before: SceneTextures::new(gpu, 0, false),
             last: None,
         });
@@ -437,7 +442,7 @@ impl Renderer {
         })?;
 
         let mut ctx = Context { gpu, uniforms: scene.uniforms, variant: scene.variant, timings, interrupt };
-        let Animation { refined, fresh, before, now, composed, scene_before, .. } = &*animation;
+        let Animation { refined, fresh, before, now, composed, backdrop, scene_before, .. } = &*animation;
         if frame.cloudless > 0 {
             frame.sheet_rows = height;
         } else if last.is_none() {
@@ -467,15 +472,36 @@ impl Renderer {
             let mut ctx = Context { gpu, uniforms: scene.uniforms, variant: scene.variant, timings, interrupt };
             march_listed(&mut ctx, &scene, &mut frame, rays, &mut self.march_pace, refined, now)?;
         }
-        let mut image = Vec::with_capacity(4 * pixels as usize);
-        in_bands(&mut self.pixel_pace, gpu, &scene, &mut frame, [width, height], |frame| {
+        // What stands still becomes the still.
+        let by_cells = frame.moving > 0 && composite::by_cells(&frame);
+        if by_cells {
             let mut work = gpu.work();
-            composite::run(gpu, &mut work, &scene, frame, now, composed, false)?;
-            let (row, rows) = (u64::from(frame.first_row), u64::from(frame.rows));
-            work.download(&composed.image, 16 * u64::from(width) * row, 16 * u64::from(width) * rows);
-            image.extend_from_slice(work.submit(timings, interrupt)?[0].numbers());
-            Ok(())
-        })?;
+            work.clear(&refined.count);
+            composite::backdrop(gpu, &mut work, &scene, &frame, backdrop)?;
+            work.submit(timings, interrupt)?;
+            let mut pixels = 0;
+            in_bands(&mut self.cell_pace, gpu, &scene, &mut frame, [width, height], |frame| {
+                let mut work = gpu.work();
+                composite::run_cells(gpu, &mut work, &scene, frame, now, backdrop, refined, composed)?;
+                work.download(&refined.count, 0, 4);
+                pixels = work.submit(timings, interrupt)?[0].numbers()[0];
+                Ok(())
+            })?;
+            in_list(&mut self.pixel_pace, gpu, &scene, &mut frame, pixels, |frame| {
+                let mut work = gpu.work();
+                composite::run_list(gpu, &mut work, &scene, frame, now, refined, composed)?;
+                work.submit(timings, interrupt).map(drop)
+            })?;
+        } else {
+            in_bands(&mut self.pixel_pace, gpu, &scene, &mut frame, [width, height], |frame| {
+                let mut work = gpu.work();
+                composite::run(gpu, &mut work, &scene, frame, now, composed, false)?;
+                work.submit(timings, interrupt).map(drop)
+            })?;
+        }
+        let mut work = gpu.work();
+        work.download(&composed.image, 0, 16 * pixels);
+        let image = work.submit(timings, interrupt)?[0].numbers().to_vec();
 
         gpu.pipelines.store();
         mem::swap(&mut animation.before, &mut animation.now);
@@ -958,18 +984,12 @@ fn march_listed(
     refined: &Refined,
     out: &Marched,
 ) -> Result<()> {
-    frame.first_ray = 0;
-    while frame.first_ray < rays {
-        frame.active_rays = pace.pixels().min(rays - frame.first_ray);
-        scene.uniforms.upload_frame(ctx.gpu, frame);
-        let started = Instant::now();
-        let mut work = ctx.gpu.work();
-        march::run_list(ctx.gpu, &mut work, scene, frame, refined, out)?;
-        work.submit(ctx.timings, ctx.interrupt)?;
-        pace.learn(u64::from(frame.active_rays), started);
-        frame.first_ray += frame.active_rays;
-    }
-    Ok(())
+    let (gpu, interrupt) = (ctx.gpu, ctx.interrupt);
+    in_list(pace, gpu, scene, frame, rays, |frame| {
+        let mut work = gpu.work();
+        march::run_list(gpu, &mut work, scene, frame, refined, out)?;
+        work.submit(ctx.timings, interrupt).map(drop)
+    })
 }
 
 /// How many pixels a second buys, from the bands so far.
@@ -999,6 +1019,27 @@ impl Pace {
         let seen = pixels as f64 / started.elapsed().as_secs_f64().max(1e-6);
         self.pixels_per_second = seen.clamp(self.pixels_per_second / 4.0, self.pixels_per_second * 4.0);
     }
+}
+
+/// Runs `submit` for part after part of a list of so many pixels.
+fn in_list(
+    pace: &mut Pace,
+    gpu: &Gpu,
+    scene: &Scene<'_>,
+    frame: &mut Frame,
+    pixels: u32,
+    mut submit: impl FnMut(&Frame) -> Result<()>,
+) -> Result<()> {
+    frame.first_ray = 0;
+    while frame.first_ray < pixels {
+        frame.active_rays = pace.pixels().min(pixels - frame.first_ray);
+        scene.uniforms.upload_frame(gpu, frame);
+        let started = Instant::now();
+        submit(frame)?;
+        pace.learn(u64::from(frame.active_rays), started);
+        frame.first_ray += frame.active_rays;
+    }
+    Ok(())
 }
 
 /// Runs `submit` for band after band of a sheet, from the row where it begins to that where it ends.

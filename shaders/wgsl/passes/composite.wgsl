@@ -26,6 +26,12 @@ const GROUND_PIECES = 8u;
 // wrong too, and long enough that a level ray, which meets 50 times the layer, changes by 25 % a metre at the default.
 const HIGH_FADE = 100.0;
 
+// Pixels of a cell in each direction (as in composite.rs).
+const TILE = 4u;
+// Second difference of radiance and transmittance from corner to corner past which each pixel of a cell is worked out, as a
+// share of the brightest.
+const BEND = 0.05;
+
 // Luminance of Rec. 709 red, green and blue.
 const LUMINANCE = vec3f(0.2126, 0.7152, 0.0722);
 
@@ -41,8 +47,12 @@ fn composite(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= frame.width || id.y >= frame.rows {
         return;
     }
-    let index = (frame.first_row + id.y - frame.sheet_row) * frame.width + id.x;
-    let pixel = vec2u(id.x, frame.first_row + id.y);
+    compose(vec2u(id.x, frame.first_row + id.y));
+}
+
+// A pixel of the picture.
+fn compose(pixel: vec2u) {
+    let index = (pixel.y - frame.sheet_row) * frame.width + pixel.x;
     let view = view_direction(vec2f(pixel) + 0.5);
     if view.w == 0.0 {
         image[index] = vec4f(0.0);
@@ -52,7 +62,175 @@ fn composite(@builtin(global_invocation_id) id: vec3u) {
         }
         return;
     }
-    let direction = view.xyz;
+    var here = Layer(vec3f(0.0), 1.0, 0.0);
+    if !CLOUDLESS {
+        let cloud = clouds[index];
+        here = Layer(cloud.rgb, cloud.a, max(cloud_depth[index], 0.0));
+    }
+    let sight = sight_of(view.xyz, pixel, here);
+    if LAYERS {
+        sky[index] = vec4f(sight.background, 1.0);
+        let covered = 1.0 - sight.seen.transmittance;
+        depth[index] = select(-1.0, sight.seen.distance / covered, covered > 0.0);
+    }
+    image[index] = picture_of(sight);
+}
+
+// What is behind the marched clouds at every fourth pixel, in both directions, from the first to the first past the last.
+@compute @workgroup_size(8, 8)
+fn backdrop(@builtin(global_invocation_id) id: vec3u) {
+    let size = (vec2u(frame.width, frame.height) + TILE - 1u) / TILE + 1u;
+    if any(id.xy >= size) {
+        return;
+    }
+    let index = id.y * size.x + id.x;
+    let pixel = id.xy * TILE;
+    let view = view_direction(vec2f(pixel) + 0.5);
+    let sight = sight_of(view.xyz, min(pixel, vec2u(frame.width, frame.height) - 1u), Layer(vec3f(0.0), 1.0, 0.0));
+    let opacity = 1.0 - sight.seen.transmittance;
+    var distance = sight.seen.distance / max(opacity, 1e-6);
+    // The sun's disc may lie between the corners of a cell.
+    let near_sun = SUN_RADIUS + f32(2u * TILE) * pixel_width();
+    if view.w == 0.0 || one_minus_cos(view.xyz, frame.sun_direction) < 0.5 * near_sun * near_sun {
+        distance = -1.0;
+    }
+    backdrop_high[index] = vec4f(sight.seen.radiance, sight.seen.transmittance);
+    backdrop_sky[index] = vec4f(sight.background, distance);
+}
+
+// Puts the clouds of a cell before what lies behind its corners, where these look alike; else it lists its pixels.
+@compute @workgroup_size(8, 8)
+fn composite_cells(@builtin(global_invocation_id) id: vec3u) {
+    let columns = (frame.width + TILE - 1u) / TILE;
+    let corner = vec2u(id.x * TILE, frame.first_row + id.y * TILE);
+    if id.x >= columns || corner.y >= frame.first_row + frame.rows {
+        return;
+    }
+    let first = corner.y / TILE * (columns + 1u) + id.x;
+    let corners = vec4u(first, first + 1u, first + columns + 1u, first + columns + 2u);
+    let high = mat4x4f(
+        backdrop_high[corners[0]],
+        backdrop_high[corners[1]],
+        backdrop_high[corners[2]],
+        backdrop_high[corners[3]],
+    );
+    let sky = mat4x4f(
+        backdrop_sky[corners[0]],
+        backdrop_sky[corners[1]],
+        backdrop_sky[corners[2]],
+        backdrop_sky[corners[3]],
+    );
+    let last = vec2i(vec2u(columns, (frame.height + TILE - 1u) / TILE));
+    // Whether it is smooth shows at the corners of the cells around too: high clouds near the horizon are lower than a cell.
+    // What bends from one to the next by so much, interpolation misses by an eighth of that, if it is smooth.
+    var before: mat4x4f;
+    var earlier: mat4x4f;
+    var bend = vec4f(0.0);
+    var brightest = 0.0;
+    var nearest = 0.0;
+    var k = 0;
+    loop {
+        var row: mat4x4f;
+        for (var j = 0; j < 4; j++) {
+            let at = vec2u(clamp(vec2i(corner / TILE) + vec2i(j, k) - 1, vec2i(0), last));
+            let one = at.y * (columns + 1u) + at.x;
+            let layer = backdrop_high[one];
+            let behind = backdrop_sky[one];
+            row[j] = vec4f(layer.rgb + layer.a * behind.rgb, layer.a);
+            brightest = max(brightest, max(max(row[j].r, row[j].g), row[j].b));
+            nearest = min(nearest, behind.a);
+        }
+        let across = max(abs(row[0] - 2.0 * row[1] + row[2]), abs(row[1] - 2.0 * row[2] + row[3]));
+        bend = max(bend, across);
+        if k >= 2 {
+            for (var j = 0; j < 4; j++) {
+                bend = max(bend, abs(row[j] - 2.0 * before[j] + earlier[j]));
+            }
+        }
+        if k == 3 {
+            break;
+        }
+        earlier = before;
+        before = row;
+        k++;
+    }
+    var alike = nearest >= 0.0 && all(bend <= BEND * vec4f(vec3f(brightest), 1.0));
+    if SCENE {
+        alike = alike && nearest_scene(corner) >= NO_SCENE;
+    }
+    var i = 0u;
+    loop {
+        let place = vec2u(i % TILE, i / TILE);
+        let pixel = corner + place;
+        if all(pixel < vec2u(frame.width, frame.height)) {
+            let index = pixel.y * frame.width + pixel.x;
+            let share = vec2f(place) / f32(TILE);
+            let shares = vec4f((1.0 - share.x) * (1.0 - share.y), share.x * (1.0 - share.y), (1.0 - share.x) * share.y, share.x * share.y);
+            let far = high * shares;
+            let behind = sky * shares;
+            var here = Layer(vec3f(0.0), 1.0, 0.0);
+            if !CLOUDLESS {
+                let cloud = clouds[index];
+                here = Layer(cloud.rgb, cloud.a, max(cloud_depth[index], 0.0));
+            }
+            var layer = Layer(far.rgb, far.a, behind.a);
+            let under = layer.distance < here.distance;
+            if alike {
+                let seen = Layer(
+                    select(here.radiance + here.transmittance * layer.radiance, layer.radiance + layer.transmittance * here.radiance, under),
+                    here.transmittance * layer.transmittance,
+                    0.0,
+                );
+                image[index] = picture_of(Sight(seen, behind.rgb, 1.0));
+            } else {
+                active_rays[atomicAdd(&ray_count, 1u)] = index;
+            }
+        }
+        if i == TILE * TILE - 1u {
+            break;
+        }
+        i++;
+    }
+}
+
+fn nearest_scene(corner: vec2u) -> f32 {
+    var nearest = NO_SCENE;
+    var i = 0u;
+    loop {
+        let pixel = min(corner + vec2u(i % TILE, i / TILE), vec2u(frame.width, frame.height) - 1u);
+        nearest = min(nearest, scene_distance(pixel));
+        if i == TILE * TILE - 1u {
+            break;
+        }
+        i++;
+    }
+    return nearest;
+}
+
+// The pixels of the list.
+@compute @workgroup_size(64)
+fn composite_list(@builtin(global_invocation_id) id: vec3u) {
+    if id.x >= frame.active_rays {
+        return;
+    }
+    let index = active_rays[frame.first_ray + id.x];
+    compose(vec2u(index % frame.width, index / frame.width));
+}
+
+// What a pixel sees: all clouds, what is behind them, and how much of that is ours to say.
+struct Sight {
+    seen: Layer,
+    background: vec3f,
+    opacity: f32,
+}
+
+fn picture_of(sight: Sight) -> vec4f {
+    let whole = vec4f(sight.seen.radiance + sight.seen.transmittance * sight.background, sight.opacity);
+    return select(vec4f(sight.seen.radiance, 1.0 - sight.seen.transmittance), whole, frame.background > 0u);
+}
+
+// What is seen in a direction, with the clouds that were marched there.
+fn sight_of(direction: vec3f, pixel: vec2u, here: Layer) -> Sight {
     let scene = scene_distance(pixel);
     let ground = hit_sphere(direction, frame.power_ground);
     var way = Way(0.0, 0.0, ground.enters);
@@ -64,11 +242,6 @@ fn composite(@builtin(global_invocation_id) id: vec3u) {
         air = Air(whole_air(direction, way), sky_radiance(direction));
     }
 
-    var here = Layer(vec3f(0.0), 1.0, 0.0);
-    if !CLOUDLESS {
-        let cloud = clouds[index];
-        here = Layer(cloud.rgb, cloud.a, max(cloud_depth[index], 0.0));
-    }
     // The march has seen them through the air.
     var seen = Layer(here.radiance, here.transmittance, (1.0 - here.transmittance) * here.distance);
     if HIGH {
@@ -116,17 +289,7 @@ fn composite(@builtin(global_invocation_id) id: vec3u) {
             opacity = 1.0 - seen.transmittance * dot(white - background, LUMINANCE);
         }
     }
-
-    if LAYERS {
-        sky[index] = vec4f(background, 1.0);
-        let covered = 1.0 - seen.transmittance;
-        depth[index] = select(-1.0, seen.distance / covered, covered > 0.0);
-    }
-    if frame.background > 0u {
-        image[index] = vec4f(seen.radiance + seen.transmittance * background, opacity);
-    } else {
-        image[index] = vec4f(seen.radiance, 1.0 - seen.transmittance);
-    }
+    return Sight(seen, background, opacity);
 }
 
 // Share of the sun that the clouds in its way scatter on to the ground: that of stratus (Haurwitz 1948: stratus 0.25,

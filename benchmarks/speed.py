@@ -147,6 +147,7 @@ def _pairs() -> Iterator[tuple[str, str, Row, Row]]:
     # What a picture has, and what it costs when it is switched off.
     yield "without air", "fair_weather", {"atmosphere.enabled": False}, {}
     yield "without shadows on the ground", "fair_weather", {"atmosphere.ground_shadows": False}, {}
+    yield "without beams", "fair_weather", {"atmosphere.beams": False}, {}
     yield "without high clouds", "fair_weather", bare, {}
     yield "without the larger weather map", "fair_weather", {"weather.broad_variety": 0.0}, {}
     yield "without the second deck", "two_decks", {"upper_clouds.coverage": 0.0}, {}

@@ -425,6 +425,9 @@ def test_memory(sun_volume):
     assert still == {n: 96 * 54 * b for n, b in bytes_a_pixel.items()} | {"ray_count": 16}
     bigger = nubis.Renderer(192, 108, quality=quality)
     bigger.render(*FAIR)
-    assert held(bigger, "scene") == scene and held(bigger, "still")["sky"] == 4 * still["sky"]
+    # A ray for each pixel and one more, until they are a degree apart.
+    assert scene.pop("beams") == 8 * 97 * 55 * 32
+    assert (again := held(bigger, "scene")).pop("beams") < 8 * 193 * 109 * 32
+    assert again == scene and held(bigger, "still")["sky"] == 4 * still["sky"]
     next(renderer.animate([(*FAIR, 0.0)]))
     assert held(renderer, "animation")["image"] == 16 * 96 * 54

@@ -98,8 +98,8 @@ def checked(layers, params, quality):
     converged = quality.tolerance > 0 or params.light.model == "path"
     if params.light.model != "path" and not converged:
         steps = 2 * max(quality.steps_zenith, quality.steps_horizon)
-        # A full sample, a cheap one, and those toward the sun with the far one.
-        assert layers["samples"].max() <= steps * (3 + quality.light_steps)
+        # A full sample, a cheap one, and where it is lit one more and those toward the sun.
+        assert layers["samples"].max() <= steps * (4 + quality.light_steps)
     if not params.atmosphere.enabled:
         # Rounding: five digits.
         assert (radiance <= brightest(params, quality) * (1 + 1e-5)).all()

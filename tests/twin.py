@@ -218,6 +218,7 @@ def fine(view_steps, light_steps=1, **changes):
         "big_step": 1,
         "empty_samples": 4096,
         "light_steps": light_steps,
+        "light_share": 0.0,
         "light_distance": 3000.0,
         "far_sample": False,
         "cheap_light": 1.0,

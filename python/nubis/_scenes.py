@@ -43,7 +43,15 @@ def _make() -> dict[str, tuple[Camera, Params]]:
         ),
         "sunset": (
             _look((0, 0, 200), 250, 11),
-            fair.with_(**{"sun.elevation": 3.0, "sun.azimuth": 258.0}),
+            # Before the sun clouds are as dark as they are deep: thesis2018's light glows through.
+            fair.with_(
+                **{
+                    "sun.elevation": 3.0,
+                    "sun.azimuth": 258.0,
+                    "light.model": "octaves",
+                    "light.phase": "droplet",
+                }
+            ),
         ),
         "in_cloud": (
             _look((0, 0, 2000), 20, 4),

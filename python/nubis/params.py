@@ -459,6 +459,8 @@ class Atmosphere(Block):
         from 0 to 10.
     ground_shadows : bool
         Whether clouds cast shadows on the ground that is seen. Allowed: True or False.
+    beams : bool
+        Whether clouds cast shadows on the air: crepuscular rays. Allowed: True or False.
     ground_albedo : tuple[float, float, float]
         Albedo of the ground. Allowed: 3 numbers from 0 to 1.
     """
@@ -468,6 +470,7 @@ class Atmosphere(Block):
     haze: float = 1.0
     aerial_perspective: float = 1.0
     ground_shadows: bool = True
+    beams: bool = True
     ground_albedo: tuple[float, float, float] = (0.1, 0.12, 0.07)
 
 
@@ -492,6 +495,10 @@ class Quality(Block):
         whole number from 1 to 4096.
     light_steps : int
         Light samples toward the sun, besides the far one. Allowed: a whole number from 1 to 128.
+    light_share : float
+        Share of a pixel's cloud that is lit as one, by the light samples of one place in it:
+        samples in a row are lit together once they have gathered more. 0 lights each sample by
+        itself. Allowed: a number from 0 to 1.
     sun_volume : bool
         Whether the light samples stay within two cells of a volume, baked around the eye, of
         sunlight through the clouds, and the rest is read there. Not in a grid. Allowed: True or
@@ -537,14 +544,15 @@ class Quality(Block):
     step_growth: float = 1.0
     big_step: int = 3
     empty_samples: int = 6
-    light_steps: int = 8
+    light_steps: int = 16
+    light_share: float = 0.1
     sun_volume: bool = False
     light_distance: float = 0.0
     far_sample: bool = False
     cone: float = 0.0
     cheap_light: float = 1.0
     min_transmittance: float = 0.01
-    contrast: float = 0.2
+    contrast: float = 0.3
     jitter: bool = True
     view_distance: float = 400000.0
     tolerance: float = 0.0

@@ -1,6 +1,7 @@
 // The air between the eye and what it sees, and the light along a ray: both follow from the distance alone, and smoothly,
 // so that a ray works them out at four distances and not for every sample.
 #import atmosphere
+#import beams
 
 // The air along a ray, up to the ground or to space.
 struct Way {
@@ -38,27 +39,60 @@ struct Air {
 // Pieces of the way to the first distance, and of the ways between them.
 const FIRST_PIECES = 4u;
 const PIECES = 2u;
+// Pieces of the way to the ground.
+const GROUND_PIECES = 8u;
 
 // The air before a distance on a ray, of a sky of so much radiance.
-fn air_before(direction: vec3f, distance: f32, way: Way, texel: vec2f, sky: vec3f) -> Air {
+fn air_before(direction: vec3f, distance: f32, way: Way, texels: AirTexels, sky: vec3f) -> Air {
     let start = min(way.start, distance);
     let end = min(distance, way.start + way.length);
-    return air_of(aerial_depth(direction, start, end, FIRST_PIECES), distance, way, texel, sky);
+    return air_of(aerial_depth(direction, start, end, FIRST_PIECES), distance, way, texels, sky);
 }
 
-fn air_of(depth: vec3f, distance: f32, way: Way, texel: vec2f, sky: vec3f) -> Air {
+fn air_of(depth: vec3f, distance: f32, way: Way, texels: AirTexels, sky: vec3f) -> Air {
     let amount = params.atmosphere.aerial_perspective;
     let slices = f32(textureDimensions(air_share).z);
     let root = sqrt(saturate((distance - way.start) / max(way.length, 1e-3)));
-    let at = vec3f(texel, (root * (slices - 1.0) + 0.5) / slices);
+    let at = vec3f(texels.share, (root * (slices - 1.0) + 0.5) / slices);
     let share = saturate(textureSampleLevel(air_share, clamp_sampler, at, 0.0).rgb);
     // So much more air hides so much more of the sky behind.
     let scaled = select(1.0 - pow(1.0 - share, vec3f(amount)), share, amount == 1.0);
-    return Air(exp(-amount * depth), scaled * sky);
+    var radiance = scaled * sky;
+    if BEAMS {
+        let lack = beams_before(texels.beams, distance);
+        radiance = max(radiance - select(scaled / max(share, vec3f(1e-6)), vec3f(1.0), amount == 1.0) * lack, vec3f(0.0));
+    }
+    return Air(exp(-amount * depth), radiance);
 }
 
-fn air_share_texel(direction: vec3f) -> vec2f {
-    return sky_texel(sky_coordinates(direction), vec2f(textureDimensions(air_share).xy));
+// Where the textures of the air have a direction.
+struct AirTexels {
+    share: vec2f, // `air_share`
+    beams: vec2f,
+}
+
+fn air_texels(direction: vec3f) -> AirTexels {
+    let share = sky_texel(sky_coordinates(direction), vec2f(textureDimensions(air_share).xy));
+    var beams = vec2f(0.0);
+    if BEAMS {
+        beams = beam_texel(direction);
+    }
+    return AirTexels(share, beams);
+}
+
+// All the air along a ray: to the ground, or to space from where it enters the air.
+fn whole_air(direction: vec3f, way: Way, texels: AirTexels, sky: vec3f) -> Air {
+    var radiance = sky;
+    if BEAMS {
+        radiance = max(sky - beams_before(texels.beams, way.start + way.length), vec3f(0.0));
+    }
+    if way.grounded {
+        let depth = aerial_depth(direction, way.start, way.start + way.length, GROUND_PIECES);
+        return Air(exp(-params.atmosphere.aerial_perspective * depth), radiance);
+    }
+    let altitude = select(max(frame.altitude, 0.0), AIR_TOP, frame.power_air > 0.0);
+    let through = air_transmittance(altitude, cos_zenith_along(direction, way.start, altitude));
+    return Air(select(vec3f(1.0), through, way.length > 0.0), radiance);
 }
 
 // Four distances on a ray, the first where its clouds may begin and the last where they end: near ones lie closer together.

@@ -17,6 +17,7 @@ override RAIN_SHAFTS: bool = true; // rain is seen below the clouds
 override UPPER: bool = true; // there is a second deck
 override BROAD_WEATHER: bool = true; // a larger map shifts the weather
 override PROFILE_TABLE: bool = false; // the profile by height is the user's table
+override BEAMS: bool = false; // clouds cast shadows on the air
 override SCENE: bool = false; // there is a scene of the user's among the clouds
 override LIGHT_DETAIL: bool = true; // there are light samples that see the detail
 override LIGHT_CHEAP: bool = true; // there are light samples that do not
@@ -60,6 +61,8 @@ override LIGHT_CHEAP: bool = true; // there are light samples that do not
 // Direct sun on the ground around the eye: levels in a stack, and, while they are baked, the mean of the last (passes/shadow).
 @group(0) @binding(72) var ground_shadow: texture_2d<f32>;
 @group(0) @binding(73) var ground_shadow_mean: texture_2d<f32>;
+// Light that the air before a distance lacks in those shadows, by place in the picture, times frame.sky_scale (passes/beams).
+@group(0) @binding(51) var beams: texture_3d<f32>;
 
 // One entry a pixel, row by row.
 @group(0) @binding(12) var<storage, read_write> clouds: array<vec4f>; // premultiplied radiance, transmittance

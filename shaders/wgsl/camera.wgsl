@@ -38,14 +38,10 @@ fn marched_pixel(cell: vec2u) -> vec2u {
     return min(cell * frame.stride + vec2u(frame.subpixel_x, frame.subpixel_y), vec2u(frame.width, frame.height) - 1u);
 }
 
-// The pixel that a direction from the previous camera falls on, in the picture or not; z is 0 behind the camera.
-fn previous_pixel(direction: vec3f) -> vec3f {
+// Where in the picture of a camera a direction falls, given as right, up and forward of that: from -1 to 1, right and up, or
+// beyond; z is 0 behind the camera.
+fn picture_place(local: vec3f, tan_half_fov: f32, half_fov: f32) -> vec3f {
     let size = vec2f(f32(frame.width), f32(frame.height));
-    let local = vec3f(
-        dot(direction, frame.previous_right),
-        dot(direction, frame.previous_up),
-        dot(direction, frame.previous_forward),
-    );
     var ndc: vec2f;
     var valid = true;
     switch CAMERA {
@@ -54,16 +50,27 @@ fn previous_pixel(direction: vec3f) -> vec3f {
         }
         case FISHEYE: {
             let sine = length(local.xy);
-            let r = atan2(sine, local.z) / frame.previous_half_fov;
+            let r = atan2(sine, local.z) / half_fov;
             ndc = local.xy / max(sine, 1e-9) * r * min(size.x, size.y) / size;
         }
         default: {
             valid = local.z > 1e-6;
-            ndc = local.xy / max(local.z, 1e-6) / frame.previous_tan_half_fov * vec2f(size.y / size.x, 1.0);
+            ndc = local.xy / max(local.z, 1e-6) / tan_half_fov * vec2f(size.y / size.x, 1.0);
         }
     }
-    let pixel = (ndc * vec2f(0.5, -0.5) + 0.5) * size;
-    return vec3f(pixel, select(0.0, 1.0, valid));
+    return vec3f(ndc, select(0.0, 1.0, valid));
+}
+
+// The pixel that a direction from the previous camera falls on, in the picture or not; z is 0 behind the camera.
+fn previous_pixel(direction: vec3f) -> vec3f {
+    let local = vec3f(
+        dot(direction, frame.previous_right),
+        dot(direction, frame.previous_up),
+        dot(direction, frame.previous_forward),
+    );
+    let place = picture_place(local, frame.previous_tan_half_fov, frame.previous_half_fov);
+    let size = vec2f(f32(frame.width), f32(frame.height));
+    return vec3f((place.xy * vec2f(0.5, -0.5) + 0.5) * size, place.z);
 }
 
 // Whether there is a picture at a pixel: not beyond its edges, where a panorama has only two, nor the circle of a fisheye.

@@ -206,20 +206,17 @@ struct Gathered {
     sun: vec4f, // of sun_scattering
     above: vec4f, // share of the ambient light from above
     weight: vec4f, // of all samples: together 1 less the transmittance
-    distance: f32, // weighted, m
 }
 
 fn gather(sum: Gathered, nodes: Nodes, weight: f32, sun: f32, above: f32, distance: f32) -> Gathered {
-    let reached = sum.distance + weight * distance;
     if AIR {
         let w = weight * node_shares(nodes, distance);
-        return Gathered(sum.sun + w * sun, sum.above + w * above, sum.weight + w, reached);
+        return Gathered(sum.sun + w * sun, sum.above + w * above, sum.weight + w);
     }
     return Gathered(
         vec4f(sum.sun.x + weight * sun, 0.0, 0.0, 0.0),
         vec4f(sum.above.x + weight * above, 0.0, 0.0, 0.0),
         vec4f(sum.weight.x + weight, 0.0, 0.0, 0.0),
-        reached,
     );
 }
 
@@ -246,7 +243,7 @@ fn gathered_radiance(sum: Gathered, nodes: Nodes, direction: vec3f) -> vec3f {
 
 fn radiance_through_air(sum: Gathered, nodes: Nodes, direction: vec3f) -> vec3f {
     let way = air_way(direction);
-    let texel = air_share_texel(direction);
+    let texels = air_texels(direction);
     let sky = sky_radiance(direction);
     let lit_ground = ground_share() * params.sun.irradiance;
     var radiance = vec3f(0.0);
@@ -256,7 +253,7 @@ fn radiance_through_air(sum: Gathered, nodes: Nodes, direction: vec3f) -> vec3f 
         let distance = node_distance(nodes, f32(k));
         depth += aerial_depth(direction, before, distance, select(PIECES, FIRST_PIECES, k == 0u));
         before = distance;
-        let air = air_of(depth, distance, way, texel, sky);
+        let air = air_of(depth, distance, way, texels, sky);
         let p = distance * direction;
         let h = altitude_at(p);
         let mu = cos_zenith_at(p, frame.sun_direction);

@@ -107,6 +107,8 @@ params! {
         power_base: f32 = 0.0;
         /// The same for the highest.
         power_top: f32 = 0.0;
+        /// The same for the highest that shade the air, be they procedural or the user's.
+        power_shade: f32 = 0.0;
         /// The same for the high clouds.
         power_high: f32 = 0.0;
         /// The same for the top of the air.
@@ -204,6 +206,12 @@ params! {
         scene_lit: u32 = 0;
         /// 1 where clouds cast shadows on the ground in sight, for which `composite` is compiled.
         ground_shadow: u32 = 0;
+        /// 1 where clouds cast shadows on the air in sight, for which kernels are compiled.
+        beams: u32 = 0;
+        /// Distance from which on rays may meet such air, m.
+        beam_start: f32 = 0.0;
+        /// How much farther away the last of it is, m.
+        beam_length: f32 = 1.0;
         /// Side of a texel of the user's shadow map, or of the finest level of the ground's (ground_shadow.wgsl), m.
         shadow_texel: f32 = 1.0;
         /// Where the eye is in those levels, after the wind, m from their middle.
@@ -278,8 +286,10 @@ fn on_map(v: f64, extent: f32, edge: Edge) -> f32 {
     }
 }
 
-/// Altitude of the highest corner of the user's grid, m.
-fn highest(params: &Params, [low, high]: [DVec3; 2]) -> f64 {
+/// Altitude of the highest marched clouds, m: for the user's grid of its highest corner.
+fn highest(params: &Params) -> f64 {
+    let Some(volume) = &params.volume else { return f64::from(params.shell()[1]) };
+    let [low, high] = volume.bounds();
     let radius = f64::from(params.atmosphere.planet_radius);
     let far = low.abs().max(high.abs());
     DVec3::new(far.x, far.y, high.z + radius).length() - radius
@@ -319,9 +329,7 @@ impl Frame {
     /// Whether the sun can reach the clouds: false only where `sky_light` is none (passes/sky.wgsl, atmosphere.wgsl).
     pub fn sunlit(&self, params: &Params) -> bool {
         if params.atmosphere.enabled {
-            let top =
-                params.volume.as_ref().map_or(f64::from(self.shell_top), |volume| highest(params, volume.bounds()));
-            return self.sun_above(params, top);
+            return self.sun_above(params, highest(params));
         }
         // Where `sky_light` is worked out; one light for all marched clouds.
         let height = f64::from(0.5 * (params.clouds.base + params.clouds.top));
@@ -340,13 +348,24 @@ impl Frame {
         let sine = f64::from(Vec3::from_array(self.zenith).dot(Vec3::from_array(self.sun_direction)));
         let up = sine.clamp(-1.0, 1.0).asin() > -f64::from(self.horizon_dip) - HALF_SUN;
         let lit = up && params.sun.irradiance != [0.0; 3] && air.ground_albedo != [0.0; 3];
-        air.ground_shadows && air.enabled && clouds && lit && self.sees_ground(camera)
+        air.ground_shadows && air.enabled && clouds && lit && self.sees_below(camera, self.horizon_dip.into())
     }
 
-    /// Whether any ray of a picture goes below the horizon, or within half a degree of it.
-    fn sees_ground(&self, camera: &Camera) -> bool {
+    /// Whether clouds cast shadows on the air that `camera` sees.
+    pub fn has_beams(&self, camera: &Camera, params: &Params) -> bool {
+        let air = &params.atmosphere;
+        let top = highest(params);
+        let radius = f64::from(air.planet_radius);
+        let dip = ((radius + top) / (radius + f64::from(self.altitude)).max(1.0)).min(1.0).acos();
+        let inside = f64::from(self.altitude) <= top;
+        let lit = self.sun_above(params, top);
+        air.beams && air.enabled && params.has_clouds() && lit && (inside || self.sees_below(camera, dip))
+    }
+
+    /// Whether any ray of a picture goes below a horizon at an angle under the level, or within half a degree of it.
+    fn sees_below(&self, camera: &Camera, dip: f64) -> bool {
         let down = -Vec3::from_array(self.zenith).as_dvec3();
-        let horizon = FRAC_PI_2 - f64::from(self.horizon_dip) + 0.01;
+        let horizon = FRAC_PI_2 - dip + 0.01;
         let below = |ray: DVec3| ray.normalize().dot(down).clamp(-1.0, 1.0).acos() < horizon;
         let half = match camera.projection {
             Projection::Equirect => return true,
@@ -419,6 +438,12 @@ impl Frame {
         [self.shell_base, self.shell_top] = params.shell();
         self.power_base = power(f64::from(self.shell_base));
         self.power_top = power(f64::from(self.shell_top));
+        // The air that they shade: from where the eye is nearest to it to where the last of it goes under the horizon.
+        let top = highest(params);
+        self.power_shade = power(top);
+        let tangent = |altitude: f64| (altitude.max(0.0) * (2.0 * radius + altitude)).sqrt();
+        self.beam_start = (h - top).max(0.0) as f32;
+        self.beam_length = (tangent(h) + tangent(top) - f64::from(self.beam_start)).max(1.0) as f32;
         self.power_high = power(f64::from(params.high_clouds.altitude));
         self.power_air = power(AIR_TOP);
     }

@@ -82,6 +82,8 @@ pub(crate) struct Variant {
     pub broad: bool,
     /// Whether the profile by height is the user's table.
     pub profile_table: bool,
+    /// Whether clouds cast shadows on the air.
+    pub beams: bool,
     /// Whether there is a scene of the user's.
     pub scene: bool,
     /// Whether there are light samples that see the detail.
@@ -124,6 +126,7 @@ impl Variant {
             upper: params.has_upper_clouds(),
             broad: params.has_broad_weather(),
             profile_table: params.clouds.profile.is_some() && params.volume.is_none(),
+            beams: false,
             scene: false,
             light_detail: quality.cheap_light > 0.0,
             light_cheap: quality.cheap_light < 1.0 || quality.far_sample,
@@ -149,12 +152,13 @@ impl Variant {
         Self {
             sunlit: frame.sunlit(params),
             camera: frame.camera_kind,
+            beams: frame.beams > 0,
             scene: frame.scene > 0,
             ..Self::new(params, quality)
         }
     }
 
-    fn constants(self) -> [(&'static str, f64); 24] {
+    fn constants(self) -> [(&'static str, f64); 25] {
         let switch = |on| f64::from(u8::from(on));
         [
             ("MODEL", f64::from(self.model as u32)),
@@ -170,6 +174,7 @@ impl Variant {
             ("UPPER", switch(self.upper)),
             ("BROAD_WEATHER", switch(self.broad)),
             ("PROFILE_TABLE", switch(self.profile_table)),
+            ("BEAMS", switch(self.beams)),
             ("SCENE", switch(self.scene)),
             ("LIGHT_DETAIL", switch(self.light_detail)),
             ("LIGHT_CHEAP", switch(self.light_cheap)),

@@ -329,6 +329,8 @@ params! {
         aerial_perspective: f32 = 1.0, in 0..=10 "";
         /// Whether clouds cast shadows on the ground that is seen.
         ground_shadows: bool = true;
+        /// Whether clouds cast shadows on the air: crepuscular rays.
+        beams: bool = true;
         /// Albedo of the ground.
         ground_albedo: [f32; 3] = [0.10, 0.12, 0.07], in 0..=1 "";
     }
@@ -346,7 +348,10 @@ params! {
         /// Full samples of zero in a row after which samples are cheap again (nubis2015: 6).
         empty_samples: u32 = 6, in 1..=4096 "";
         /// Light samples toward the sun, besides the far one.
-        light_steps: u32 = 8, in 1..=128 "";
+        light_steps: u32 = 16, in 1..=128 "";
+        /// Share of a pixel's cloud that is lit as one, by the light samples of one place in it: samples in a row are lit
+        /// together once they have gathered more. 0 lights each sample by itself.
+        light_share: f32 = 0.1, in 0..=1 "";
         /// Whether the light samples stay within two cells of a volume, baked around the eye, of sunlight through the clouds,
         /// and the rest is read there. Not in a grid.
         sun_volume: bool = false;
@@ -364,7 +369,7 @@ params! {
         /// Largest contrast between neighbouring rays, past which the pixels between them get rays of their own. Of pixels
         /// less than an eighth of a degree wide one in sixteen is marched first, of a quarter one in four, of wider ones
         /// every one; 0 marches every one of any width.
-        contrast: f32 = 0.2, in 0..=1 "";
+        contrast: f32 = 0.3, in 0..=1 "";
         /// Whether each ray starts at a blue-noise offset of up to one step.
         jitter: bool = true;
         /// Farthest distance at which clouds are marched.
@@ -658,6 +663,7 @@ impl Quality {
             step_growth: 0.0,
             big_step: 1,
             light_steps: 5,
+            light_share: 0.0,
             light_distance: 700.0,
             far_sample: true,
             cone: 0.12,
@@ -670,8 +676,6 @@ impl Quality {
             "draft" => Self {
                 steps_zenith: 54,
                 steps_horizon: 128,
-                light_steps: 5,
-                cheap_light: 0.0,
                 min_transmittance: 0.03,
                 contrast: 0.5,
                 path_samples: 16,
@@ -680,7 +684,8 @@ impl Quality {
             "high" => Self {
                 steps_zenith: 192,
                 steps_horizon: 512,
-                light_steps: 32,
+                light_steps: 48,
+                light_share: 0.03,
                 min_transmittance: 0.002,
                 contrast: 0.0,
                 path_samples: 256,
@@ -710,12 +715,16 @@ impl Quality {
         // lavapipe ends loops without a word after 65,535 iterations summed over a shader (docs/numerics.md).
         // Growing steps may be twice as many (passes/march.wgsl).
         let steps = self.steps_zenith.max(self.steps_horizon) * if self.step_growth > 0.0 { 2 } else { 1 };
-        let samples = steps * (2 + self.light_steps);
-        if samples > 40_000 {
+        // What is lit as one has gathered more than its share; the rest of the ray is one more.
+        let looks = (1.0 / self.light_share + 1.0).min(steps as f32) as u32;
+        let turns = 2 * steps + looks * (1 + self.light_steps);
+        if turns > 40_000 {
             return Err(Error::parameter(
                 "quality.light_steps",
                 self.light_steps,
-                format!("so small that view steps times (2 + light steps), here {samples}, is at most 40000"),
+                format!(
+                    "so small that twice the view steps and the light samples of all looks, here {turns}, are at most 40000"
+                ),
             ));
         }
         Ok(())

@@ -15,6 +15,7 @@ use crate::frame::Frame;
 use crate::gpu::{Gpu, Interrupt, Timings, Work, check_fork};
 use crate::kernel::{Binding, Kernel, Variant, Wanted};
 use crate::params::{self, Model, Params, Quality};
+use crate::passes::beams::{self, Beams};
 use crate::passes::broad_weather::BroadWeather;
 use crate::passes::composite::{Backdrop, Composed};
 use crate::passes::high_clouds::{self, HighClouds};
@@ -107,7 +108,12 @@ impl Method {
         let bakes = high.into_iter().chain(BAKES).map(|(pass, entry)| (pass, entry, Variant::bake()));
         let composite = ("composite", "composite", composite::variant(variant, frame, layers));
         let clouds = clouds.iter().map(with(variant));
-        bakes.chain(shadow::kernels(frame, variant)).chain(clouds).chain([composite]).collect()
+        bakes
+            .chain(shadow::kernels(frame, variant))
+            .chain(beams::kernel(variant))
+            .chain(clouds)
+            .chain([composite])
+            .collect()
     }
 
     /// Whether there is nothing to march.
@@ -206,7 +212,7 @@ impl Renderer {
 
     /// What the last picture has left on the GPU: for whom, the variable of the shaders, and bytes.
     ///
-    /// The `scene` is what every picture reads, whatever its size; noises among it are shared by the renderers of a device.
+    /// The `scene` is what every picture reads, whatever its size, but for `beams`, which small ones have less of; noises among it are shared by the renderers of a device.
     /// A `still` and an `animation` have buffers of so many bytes a pixel.
     pub fn memory(&self) -> Vec<(&'static str, &'static str, u64)> {
         let mut held: Vec<_> = self.world.memory.iter().map(|&(name, bytes)| ("scene", name, bytes)).collect();
@@ -277,6 +283,7 @@ impl Renderer {
         frame.background = u32::from(background);
         frame.first_sample = first_sample;
         frame.ground_shadow = u32::from((background || all) && frame.has_ground_shadow(camera, params));
+        frame.beams = u32::from(frame.has_beams(camera, params));
         let method = Method::new(params, &self.quality);
         frame.cloudless = u32::from(method.is_cloudless(params));
         let Self { gpu, world, quality, timings, .. } = self;
@@ -379,6 +386,7 @@ impl Renderer {
         let params = &params;
         frame.background = u32::from(background);
         frame.ground_shadow = u32::from(background && frame.has_ground_shadow(camera, params));
+        frame.beams = u32::from(frame.has_beams(camera, params));
         frame.cloudless = u32::from(Method::March.is_cloudless(params));
         let [width, height] = self.size;
         let pixels = u64::from(width) * u64::from(height);
@@ -766,6 +774,7 @@ struct World {
     majorants: Majorants,
     sun_volume: SunVolume,
     ground_shadow: GroundShadow,
+    beams: Beams,
     scene_depth: SceneTextures,
     /// Names and bytes of all of it, as it was bound last.
     memory: Vec<(&'static str, u64)>,
@@ -793,6 +802,7 @@ impl World {
             majorants: Majorants::new(),
             sun_volume: SunVolume::new(),
             ground_shadow: GroundShadow::new(),
+            beams: Beams::new(),
             scene_depth: SceneTextures::new(gpu, 0, false),
             memory: Vec::new(),
         }
@@ -850,6 +860,8 @@ impl World {
         bindings.extend(sun_volume);
         let ground_shadow = self.ground_shadow.run(&mut ctx, params, frame, at, &bindings)?; // as those, where it is seen
         bindings.extend(ground_shadow);
+        let beams = self.beams.run(&mut ctx, frame, &bindings)?; // for each picture, where clouds shade its air
+        bindings.extend(beams);
         bindings.extend(self.scene_depth.bindings());
         let held = bindings.iter().filter(|(_, binding)| !matches!(binding, Binding::Sampler(_)));
         self.memory = held.map(|(name, binding)| (*name, binding.bytes())).collect();

@@ -19,8 +19,6 @@ const SUN_RADIUS = 0.004654;
 // Exponents of the cosine at the sun's surface by which its limb darkens, at 680, 550 and 440 nm (Hestroffer and Magnan
 // 1998, after Hillaire 2016).
 const LIMB = vec3f(0.397, 0.503, 0.652);
-// Pieces of the way to the ground.
-const GROUND_PIECES = 8u;
 
 // Height above or below the high clouds at which an eye sees all of them, m. Short, as a place in the sky without them is
 // wrong too, and long enough that a level ray, which meets 50 times the layer, changes by 25 % a metre at the default.
@@ -234,12 +232,14 @@ fn sight_of(direction: vec3f, pixel: vec2u, here: Layer) -> Sight {
     let scene = scene_distance(pixel);
     let ground = hit_sphere(direction, frame.power_ground);
     var way = Way(0.0, 0.0, ground.enters);
-    var texel = vec2f(0.0);
+    var texels = AirTexels(vec2f(0.0), vec2f(0.0));
+    var sky_behind = vec3f(0.0);
     var air = Air(vec3f(1.0), vec3f(0.0));
     if AIR {
         way = air_way(direction);
-        texel = air_share_texel(direction);
-        air = Air(whole_air(direction, way), sky_radiance(direction));
+        texels = air_texels(direction);
+        sky_behind = sky_radiance(direction);
+        air = whole_air(direction, way, texels, sky_behind);
     }
 
     // The march has seen them through the air.
@@ -254,7 +254,7 @@ fn sight_of(direction: vec3f, pixel: vec2u, here: Layer) -> Sight {
         loop {
             let at = select(high.near, high.far, crossing == 1);
             let hit = high.hit && at > 0.0 && at < scene && !(ground.enters && at > ground.near);
-            let layer = through_air(high_layer(direction, at, hit), direction, way, texel, air.radiance);
+            let layer = through_air(high_layer(direction, at, hit), direction, way, texels, sky_behind);
             if at < here.distance {
                 before = over(before, layer);
             } else {
@@ -282,19 +282,15 @@ fn sight_of(direction: vec3f, pixel: vec2u, here: Layer) -> Sight {
     var opacity = 1.0;
     if SCENE && scene < NO_SCENE {
         let bright = scene_radiance(pixel);
-        background = through_air(Layer(bright, 0.0, scene), direction, way, texel, air.radiance).radiance;
+        background = through_air(Layer(bright, 0.0, scene), direction, way, texels, sky_behind).radiance;
         if frame.scene_lit == 0u {
             // The caller puts a scene of his own behind: what he adds is dimmed by cloud and air.
-            let white = through_air(Layer(vec3f(1.0), 0.0, scene), direction, way, texel, air.radiance).radiance;
+            let white = through_air(Layer(vec3f(1.0), 0.0, scene), direction, way, texels, sky_behind).radiance;
             opacity = 1.0 - seen.transmittance * dot(white - background, LUMINANCE);
         }
     }
     return Sight(seen, background, opacity);
 }
-
-// Share of the sun that the clouds in its way scatter on to the ground: that of stratus (Haurwitz 1948: stratus 0.25,
-// stratocumulus 0.35, nimbostratus 0.18 of a clear sky). Without it the ground under overcast is lit by blue sky alone.
-const PASSED_ON = 0.25;
 
 // The ground without the sun that clouds keep from it.
 fn ground_in_shadow(lit: vec3f, p: vec3f) -> vec3f {
@@ -319,12 +315,12 @@ fn ground_seen(p: vec3f) -> vec3f {
 }
 
 // A layer at a distance behind the air in front of it.
-fn through_air(layer: Layer, direction: vec3f, way: Way, texel: vec2f, sky: vec3f) -> Layer {
+fn through_air(layer: Layer, direction: vec3f, way: Way, texels: AirTexels, sky: vec3f) -> Layer {
     let opacity = 1.0 - layer.transmittance;
     if !AIR {
         return Layer(layer.radiance, layer.transmittance, opacity * layer.distance);
     }
-    let air = air_before(direction, layer.distance, way, texel, sky);
+    let air = air_before(direction, layer.distance, way, texels, sky);
     let radiance = layer.radiance * air.transmittance + opacity * air.radiance;
     return Layer(radiance, layer.transmittance, opacity * layer.distance);
 }
@@ -335,17 +331,6 @@ fn over(front: Layer, back: Layer) -> Layer {
         front.transmittance * back.transmittance,
         front.distance + front.transmittance * back.distance,
     );
-}
-
-// Transmittance of all the air along a ray: to the ground, or to space from where it enters the air.
-fn whole_air(direction: vec3f, way: Way) -> vec3f {
-    if way.grounded {
-        let depth = aerial_depth(direction, way.start, way.start + way.length, GROUND_PIECES);
-        return exp(-params.atmosphere.aerial_perspective * depth);
-    }
-    let altitude = select(max(frame.altitude, 0.0), AIR_TOP, frame.power_air > 0.0);
-    let through = air_transmittance(altitude, cos_zenith_along(direction, way.start, altitude));
-    return select(vec3f(1.0), through, way.length > 0.0);
 }
 
 // Smallest cosine that counts for the way of sunlight through the high clouds: they are 300 m thick (thesis2018: 200 to

@@ -63,6 +63,8 @@ struct Steps {
     length: f32,
     growth: f32,
     scale: f32, // log2 of the ratio of a step to the one before
+    ratio: f32, // of a step to its distance, where they grow, plus 1 / growth
+    equal: f32, // all of them, where they do not, m
 }
 
 fn ray_steps(start: f32, length: f32, direction: vec3f) -> Steps {
@@ -76,13 +78,16 @@ fn ray_steps(start: f32, length: f32, direction: vec3f) -> Steps {
     // it gets up to twice the steps, or its far clouds are grain.
     let reach = log(1.0 + growth * length);
     let steps = round(count * clamp(sqrt(reach), 1.0, 2.0));
-    return Steps(u32(steps), length, growth, reach / log(2.0) / steps);
+    let each = reach / steps;
+    // exp(each) - 1 with all its digits.
+    let ratio = each * exp(each) * one_minus_exp_over(each);
+    return Steps(u32(steps), length, growth, each / log(2.0), ratio, select(0.0, length / steps, growth == 0.0));
 }
 
 // Distance from the start of the march to a step boundary.
 fn step_distance(steps: Steps, i: f32) -> f32 {
     if steps.growth == 0.0 {
-        return steps.length * i / f32(steps.count);
+        return steps.equal * i;
     }
     return (exp2(steps.scale * i) - 1.0) / steps.growth;
 }
@@ -92,18 +97,43 @@ struct Sample {
     p: vec3f,
     t: f32,
     altitude: f32,
-    length: f32, // of the step it stands for
+    begin: f32, // of the step it stands for, m from the start of the march
+    length: f32, // of that step
     width: f32, // a pixel across, or a good part of the step along the ray, whichever is more
 }
 
 fn march_sample(s: Stretches, steps: Steps, direction: vec3f, offset: f32, i: u32, pixel_size: f32) -> Sample {
     let begin = step_distance(steps, f32(i));
-    let length = step_distance(steps, f32(i + 1u)) - begin;
+    let length = select((1.0 / steps.growth + begin) * steps.ratio, steps.equal, steps.growth == 0.0);
     let from_start = begin + offset * length;
     let t = stretch_distance(s, from_start);
     let p = t * direction;
-    return Sample(p, t, altitude_at(p), length, max(t * pixel_size, 0.3 * length));
+    return Sample(p, t, altitude_at(p), begin, length, max(t * pixel_size, 0.3 * length));
 }
+
+// Samples in a row that are lit as one.
+struct Group {
+    weight: f32, // of all of them: what they take from the transmittance
+    distance: f32, // mean by weight, m from the eye
+    width: f32, // of the last
+}
+
+// Their place is where most of them is: a sample that outweighs all before it has its own, or a veil before a cloud would
+// move it into the gap between.
+fn with_sample(group: Group, weight: f32, at: Sample) -> Group {
+    let total = group.weight + weight;
+    let mean = group.distance + (at.t - group.distance) * weight / total;
+    return Group(total, select(mean, at.t, weight > group.weight), at.width);
+}
+
+// A group that waits for its light, and the opacity of the ray up to its end.
+struct Look {
+    group: Group,
+    opacity: f32,
+}
+
+// Most groups that wait: with the default share of light a ray has no more.
+const LOOKS = 12u;
 
 // At which step a distance is reached.
 fn step_index(steps: Steps, distance: f32) -> f32 {
@@ -140,55 +170,60 @@ fn march_ray(direction: vec3f, limit: f32, offset: f32, within: vec2f) -> Cloud 
     var span = NOWHERE;
     var seen = i; // steps below this one have had their full sample
     var empty = quality.empty_samples; // full samples of zero in a row; from that many on, samples are cheap
-    // A loop in a loop, and no branch with much behind it: lavapipe runs both sides of every branch, and skips only loops
-    // that none of its eight rays is in. Each ray of a group goes on to its next cloud, and all take the dear part, the
-    // light, together; a GPU's rays do likewise. Measured: 2.6 times as fast as one loop of branches.
+    var reached = 0.0; // distance by weight, m
+    var group = Group();
+    var looks: array<Look, LOOKS>;
+    var count = 0u;
+    // First the ray, then the light: lavapipe runs both sides of every branch, and eight rays together. Each goes on through
+    // gaps and clouds of its own, and none waits for another's light. Measured at 1280x720, night included: 35 samples a ray of
+    // `fair_weather` in `draft` take 45 turns, and light 3; where light was looked for at each sample, 86 and 16.
     loop {
-        var at: Sample;
-        var column: Column;
-        var shape = 0.0;
-        // On to the next cloud: big steps with cheap samples outside, back by what was leapt over on a hit.
         loop {
-            at = march_sample(stretches, steps, direction, offset, i, pixel_size);
-            column = cloud_column(at.p, at.altitude);
-            shape = cloud_shape(column, at.width);
+            let at = march_sample(stretches, steps, direction, offset, i, pixel_size);
+            let column = cloud_column(at.p, at.altitude);
+            let shape = cloud_shape(column, at.width);
+            // Big steps outside clouds; on a hit back by what was leapt over.
             let searching = empty >= quality.empty_samples;
-            if shape <= 0.0 {
-                empty += 1u;
-                i += select(1u, big, searching);
-                seen = select(i, seen, searching);
-            } else if searching {
-                empty = 0u;
-                let back = max(i - min(i, big - 1u), seen);
-                shape = select(0.0, shape, back == i);
-                i = back;
+            let hit = !(shape <= 0.0); // not "shape > 0": with that, a NaN would stand still for ever
+            let back = select(i, max(i - min(i, big - 1u), seen), searching);
+            let full = hit && back == i;
+            let density = select(0.0, cloud_density(column, shape, at.width), full);
+            empty = select(empty + 1u, 0u, density > 0.0 || (hit && searching));
+            i = select(i + select(1u, big, searching && !hit), back, hit && !full);
+            seen = select(seen, i, full || !searching);
+            if density > 0.0 {
+                let x = density * frame.extinction * at.length;
+                let weight = transmittance * x * one_minus_exp_over(x);
+                group = with_sample(group, weight, at);
+                reached += weight * at.t;
+                span = vec2f(min(span.x, at.begin), at.begin + at.length);
+                optical_depth += x;
+                transmittance = transmittance_of(optical_depth);
+                i = select(i, end, transmittance < quality.min_transmittance);
             }
-            if i >= end || !(shape <= 0.0) {
+            if group.weight > select(quality.light_share, 0.0, i >= end) {
+                looks[count] = Look(group, 1.0 - transmittance);
+                count += 1u;
+                group = Group();
+            }
+            if i >= end || count == LOOKS {
                 break;
             }
         }
-        // Not "shape > 0": with that, a NaN would stand still for ever.
-        if i < end && !(shape <= 0.0) {
-            i += 1u;
-            seen = i;
-            empty += 1u;
-            let density = cloud_density(column, shape, at.width);
-            if density > 0.0 {
-                empty = 0u;
-                let x = density * frame.extinction * at.length;
-                let weight = transmittance * x * one_minus_exp_over(x);
+        if count > 0u {
+            loop {
+                count -= 1u;
+                let look = looks[count];
+                let p = look.group.distance * direction;
+                let column = cloud_column(p, altitude_at(p));
                 var depth_to_sun = 0.0;
                 if SUNLIT && sunlit {
-                    depth_to_sun = optical_depth_to_sun(at.p, 1.0 - transmittance, at.width);
+                    depth_to_sun = optical_depth_to_sun(p, look.opacity, look.group.width);
                 }
                 let sun = sun_scattering(depth_to_sun, column.precipitation, one_minus_mu);
-                sum = gather(sum, nodes, weight, sun, ambient_share(column), at.t);
-                let from_start = step_distance(steps, f32(i));
-                span = vec2f(min(span.x, from_start - at.length), from_start);
-                optical_depth += x;
-                transmittance = transmittance_of(optical_depth);
-                if transmittance < quality.min_transmittance {
-                    i = end;
+                sum = gather(sum, nodes, look.group.weight, sun, ambient_share(column), look.group.distance);
+                if count == 0u {
+                    break;
                 }
             }
         }
@@ -209,5 +244,5 @@ fn march_ray(direction: vec3f, limit: f32, offset: f32, within: vec2f) -> Cloud 
         transmittance = 0.0;
         span.y = EVERYWHERE.y;
     }
-    return Cloud(scale * gathered_radiance(sum, nodes, direction), transmittance, sum.distance / weight, span);
+    return Cloud(scale * gathered_radiance(sum, nodes, direction), transmittance, reached / weight, span);
 }

@@ -89,7 +89,7 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
                 if AIR && ray.scatterings == 1u {
                     // The rest of the path is seen through the air.
                     let way = air_way(direction);
-                    let air = air_before(direction, t, way, air_share_texel(direction), sky_radiance(direction));
+                    let air = air_before(direction, t, way, air_texels(direction), sky_radiance(direction));
                     ray.throughput *= air.transmittance;
                     ray.light = air.radiance;
                 }

@@ -154,13 +154,15 @@ fn reference(@builtin(global_invocation_id) id: vec3u) {
             if uneven && ray.end - ray.x > 1.5 * shortest_panel(stretches, ray.x) {
                 ray.longest = 0.5 * (ray.end - ray.x);
             } else {
-                var sum = Gathered(ray.sun, ray.above, ray.weight, ray.distance);
-                sum = gather(sum, nodes, first * weight, sun.x, ray.share.x, stretch_distance(stretches, points.x));
-                sum = gather(sum, nodes, (1.0 - first) * weight, sun.y, ray.share.y, stretch_distance(stretches, points.y));
+                let weights = weight * vec2f(first, 1.0 - first);
+                let distances = vec2f(stretch_distance(stretches, points.x), stretch_distance(stretches, points.y));
+                var sum = Gathered(ray.sun, ray.above, ray.weight);
+                sum = gather(sum, nodes, weights.x, sun.x, ray.share.x, distances.x);
+                sum = gather(sum, nodes, weights.y, sun.y, ray.share.y, distances.y);
                 ray.sun = sum.sun;
                 ray.above = sum.above;
                 ray.weight = sum.weight;
-                ray.distance = sum.distance;
+                ray.distance += dot(weights, distances);
                 ray.optical_depth += x;
                 ray.x = ray.end;
             }
@@ -177,7 +179,7 @@ fn reference(@builtin(global_invocation_id) id: vec3u) {
 // A ray that has come to its end: done, or from the start again with panels half as long.
 fn finished(given: ReferenceRay, index: u32, nodes: Nodes, direction: vec3f, empty: bool) -> ReferenceRay {
     var ray = given;
-    let sum = Gathered(ray.sun, ray.above, ray.weight, ray.distance);
+    let sum = Gathered(ray.sun, ray.above, ray.weight);
     let whole = gathered_weight(sum);
     let result = vec4f(gathered_radiance(sum, nodes, direction), transmittance_of(ray.optical_depth));
     let change = abs(result - ray.previous);
@@ -185,7 +187,7 @@ fn finished(given: ReferenceRay, index: u32, nodes: Nodes, direction: vec3f, emp
     let steady = all(change.rgb <= quality.tolerance * (result.rgb + dark)) && change.a <= 0.1 * quality.tolerance;
     if empty || (ray.level > 0u && steady) || ray.level >= MOST_HALVINGS || (ray.level > 0u && evaluations > MOST_EVALUATIONS) {
         clouds[index] = select(result, vec4f(0.0, 0.0, 0.0, 1.0), empty);
-        cloud_depth[index] = select(-1.0, sum.distance / whole, !empty && whole > 0.0);
+        cloud_depth[index] = select(-1.0, ray.distance / whole, !empty && whole > 0.0);
         samples[index] = evaluations;
         uncertainty[index] = select(vec4f(change.rgb, 0.0), vec4f(0.0), empty);
         ray.stage = DONE;

@@ -25,7 +25,7 @@ fn shadow_map(@builtin(global_invocation_id) id: vec3u) {
     let p = vec3f(at, 0.0);
     let hidden = hit_ground_from(p, frame.sun_direction).enters;
     let fine = select(2.0 * finest_feature(), frame.voxel, VOLUME);
-    let depth = cloud_depth_to_sun(p, fine, MAP_STEPS) + high_depth_from(p, frame.sun_direction);
+    let depth = cloud_depth_to_sun(p, fine, MAP_STEPS).x + high_depth_from(p, frame.sun_direction);
     shadow_out[texel.y * frame.width + id.x] = select(exp(-depth), 0.0, hidden);
 }
 
@@ -39,10 +39,11 @@ fn shadow_ground(@builtin(global_invocation_id) id: vec3u) {
     let at = (vec2f(vec2u(id.x, id.y % SHADOW_SIDE)) + 0.5 - 0.5 * f32(SHADOW_SIDE)) * texel;
     let fine = select(max(2.0 * finest_feature(), texel), max(frame.voxel, 0.5 * texel), VOLUME);
     let depth = cloud_depth_to_sun(ground_place(at), fine, GROUND_STEPS);
-    textureStore(map_out, id.xy, vec4f(exp(-depth)));
+    textureStore(map_out, id.xy, exp(-depth));
 }
 
-// Lets each level go over into the next in the outer fifth of its reach, and the last into its mean.
+// Lets each level go over into the next in the outer fifth of its reach, and the last into its mean. Where there are finer
+// ones, which is where those who read a level there look for means, a texel becomes the mean of the four.
 @compute @workgroup_size(8, 8)
 fn shadow_blend(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= SHADOW_SIDE || id.y >= SHADOW_SIDE * SHADOW_LEVELS {
@@ -51,55 +52,65 @@ fn shadow_blend(@builtin(global_invocation_id) id: vec3u) {
     let level = id.y / SHADOW_SIDE;
     let last = level + 1u == SHADOW_LEVELS;
     let q = (vec2f(vec2u(id.x, id.y % SHADOW_SIDE)) + 0.5 - 0.5 * f32(SHADOW_SIDE)) * shadow_texel(level);
-    let mean = textureLoad(ground_shadow_mean, vec2u(0u), 0).r;
+    let mean = textureLoad(ground_shadow_mean, vec2u(0u), 0);
     let beyond = select(shadow_in_level(q, min(level + 1u, SHADOW_LEVELS - 1u)), mean, last);
     let edge = smoothstep(0.8, 1.0, max(abs(q.x), abs(q.y)) / shadow_reach(level));
-    textureStore(map_out, id.xy, vec4f(mix(textureLoad(ground_shadow, id.xy, 0).r, beyond, edge)));
+    var own = textureLoad(ground_shadow, id.xy, 0);
+    // Not as far as those who want the finest level that holds a place read this one.
+    let finer = shadow_reach(level) * 0.5 - 2.0 * shadow_texel(level);
+    if level > 0u && max(abs(q.x), abs(q.y)) < finer {
+        own = shadow_in_level(q, level - 1u);
+    }
+    textureStore(map_out, id.xy, mix(own, beyond, edge));
 }
 
-var<workgroup> sums: array<f32, SHADOW_SIDE>; // of rows of the last level
+var<workgroup> sums: array<vec4f, SHADOW_SIDE>; // of rows of the last level
 
 @compute @workgroup_size(SHADOW_SIDE)
 fn shadow_mean(@builtin(local_invocation_id) id: vec3u) {
-    var sum = 0.0;
+    var sum = vec4f(0.0);
     for (var i = 0u; i < SHADOW_SIDE; i++) {
-        sum += textureLoad(ground_shadow, vec2u(i, (SHADOW_LEVELS - 1u) * SHADOW_SIDE + id.x), 0).r;
+        sum += textureLoad(ground_shadow, vec2u(i, (SHADOW_LEVELS - 1u) * SHADOW_SIDE + id.x), 0);
     }
     sums[id.x] = sum / f32(SHADOW_SIDE);
     workgroupBarrier();
     if id.x == 0u {
-        var mean = 0.0;
+        var mean = vec4f(0.0);
         for (var i = 0u; i < SHADOW_SIDE; i++) {
             mean += sums[i];
         }
-        textureStore(map_out, vec2u(0u), vec4f(mean / f32(SHADOW_SIDE)));
+        textureStore(map_out, vec2u(0u), mean / f32(SHADOW_SIDE));
     }
 }
 
-// Optical depth of the marched clouds from a point to the sun, in steps of `fine` metres, or longer ones. Each reads the finest
+// Optical depth of the marched clouds from a point to the sun, and of what of them is over a quarter, a half and three quarters
+// of their height, from the far end on, so that what is behind `DARK` is dark in all of them. In steps of `fine` metres, or longer ones. Each reads the finest
 // noise: coarser levels of detail make clouds smaller, and the ground of `fair_weather` 3 % too bright in the mean, not 1 %.
-fn cloud_depth_to_sun(p: vec3f, fine: f32, most: f32) -> f32 {
+fn cloud_depth_to_sun(p: vec3f, fine: f32, most: f32) -> vec4f {
     let s = cloud_stretches_from(p, frame.sun_direction);
     let length = s.first + s.second;
     let count = clamp(ceil(length / fine), FEWEST, most);
     let step = length / count;
-    var depth = 0.0;
+    var depth = vec4f(0.0);
     var i = 0.0;
     // A loop in a loop, as in passes/march: where the weather alone says that there is nothing, nothing else is read.
     loop {
         var column: Column;
+        var q: vec3f;
         loop {
-            let q = p + stretch_distance(s, (i + 0.5) * step) * frame.sun_direction;
+            q = p + stretch_distance(s, (count - i - 0.5) * step) * frame.sun_direction;
             column = cloud_column(q, altitude_at(q));
             i += 1.0;
             if column.limit > 0.0 || i >= count {
                 break;
             }
         }
-        depth += frame.extinction * step * cloud_density(column, cloud_shape(column, 0.0), 0.0);
-        if i >= count || depth > DARK {
+        let above = vec4f(height_among_clouds(q, altitude_at(q))) >= vec4f(-1e30, 0.25, 0.5, 0.75);
+        let here = frame.extinction * step * cloud_density(column, cloud_shape(column, 0.0), 0.0);
+        depth += select(vec4f(0.0), vec4f(here), above);
+        if i >= count || depth.x > DARK {
             break;
         }
     }
-    return select(0.0, depth, length > 0.0);
+    return select(vec4f(0.0), depth, length > 0.0);
 }

@@ -1,5 +1,6 @@
 //! One module for each pass, with the WGSL file of the same name: what it reads, what it makes, when it runs again.
 
+pub mod beams;
 pub mod broad_weather;
 pub mod composite;
 pub mod high_clouds;

@@ -1,5 +1,5 @@
-//! Sunlight through the clouds to the ground: a map for the user, and levels around the eye for pictures of the ground, baked
-//! when sun or clouds have changed, or when wind or eye have gone far.
+//! Sunlight through the clouds to the ground: a map for the user, and levels around the eye for pictures of the ground and of
+//! shaded air, baked when sun or clouds have changed, or when wind or eye have gone far.
 
 use std::sync::Arc;
 
@@ -61,12 +61,12 @@ const BAKES: [&str; 3] = ["shadow_ground", "shadow_mean", "shadow_blend"];
 
 /// What they are made for: no camera, and no scene in sight.
 fn bake_variant(of: Variant) -> Variant {
-    Variant { camera: 0, scene: false, ..of }
+    Variant { camera: 0, scene: false, beams: false, ..of }
 }
 
 /// Whether a picture bakes them.
 fn wanted(frame: &Frame) -> bool {
-    frame.ground_shadow > 0 && frame.cloudless == 0
+    frame.beams > 0 || frame.ground_shadow > 0 && frame.cloudless == 0
 }
 
 /// The kernels that a picture asks for.

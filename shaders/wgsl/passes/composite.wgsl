@@ -28,7 +28,7 @@ const HIGH_FADE = 100.0;
 const TILE = 4u;
 // Second difference of radiance and transmittance from corner to corner past which each pixel of a cell is worked out, as a
 // share of the brightest.
-const BEND = 0.05;
+const SMOOTH = 0.05;
 
 // Luminance of Rec. 709 red, green and blue.
 const LUMINANCE = vec3f(0.2126, 0.7152, 0.0722);
@@ -152,7 +152,7 @@ fn composite_cells(@builtin(global_invocation_id) id: vec3u) {
         before = row;
         k++;
     }
-    var alike = nearest >= 0.0 && all(bend <= BEND * vec4f(vec3f(brightest), 1.0));
+    var alike = nearest >= 0.0 && all(bend <= SMOOTH * vec4f(vec3f(brightest), 1.0));
     if SCENE {
         alike = alike && nearest_scene(corner) >= NO_SCENE;
     }

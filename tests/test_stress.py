@@ -690,7 +690,7 @@ def test_the_largest_method_runs_to_its_end():
     params = params.with_(**{"clouds.extinction": 1e-4})
     camera = strategies.look((0, 0, 256), twin.compass(20, 25), 5.0)
     pictures = []
-    for steps, light in ((512, 2), (4096, 2), (2000, 8)):
+    for steps, light in ((512, 2), (4000, 2), (1800, 8)):
         quality = twin.fine(steps, light, step_growth=1.0)
         pictures.append(renderer((8, 1), quality).render_layers(camera, params))
         assert pictures[-1]["samples"].min() > steps

@@ -685,7 +685,7 @@ impl Quality {
                 steps_zenith: 192,
                 steps_horizon: 512,
                 light_steps: 48,
-                light_share: 0.03,
+                light_share: 0.01,
                 min_transmittance: 0.002,
                 contrast: 0.0,
                 path_samples: 256,
@@ -716,14 +716,14 @@ impl Quality {
         // Growing steps may be twice as many (passes/march.wgsl).
         let steps = self.steps_zenith.max(self.steps_horizon) * if self.step_growth > 0.0 { 2 } else { 1 };
         // What is lit as one has gathered more than its share; the rest of the ray is one more.
-        let looks = (1.0 / self.light_share + 1.0).min(steps as f32) as u32;
-        let turns = 2 * steps + looks * (1 + self.light_steps);
+        let groups = (1.0 / self.light_share + 1.0).min(steps as f32) as u32;
+        let turns = 2 * steps + groups * (1 + self.light_steps);
         if turns > 40_000 {
             return Err(Error::parameter(
                 "quality.light_steps",
                 self.light_steps,
                 format!(
-                    "so small that twice the view steps and the light samples of all looks, here {turns}, are at most 40000"
+                    "so small that twice the view steps and the light samples of all groups, here {turns}, are at most 40000"
                 ),
             ));
         }

@@ -12,12 +12,12 @@ use crate::blue_noise;
 use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
-use crate::gpu::{Gpu, Interrupt, Timings, Work, check_fork};
+use crate::gpu::{Gpu, Interrupt, Timings, check_fork};
 use crate::kernel::{Binding, Kernel, Variant, Wanted};
 use crate::params::{self, Model, Params, Quality};
 use crate::passes::beams::{self, Beams};
 use crate::passes::broad_weather::BroadWeather;
-use crate::passes::composite::{Backdrop, Composed};
+use crate::passes::composite::{Backdrop, TILE, Composed, Parts};
 use crate::passes::high_clouds::{self, HighClouds};
 use crate::passes::majorant::Majorants;
 use crate::passes::march::Marched;
@@ -50,7 +50,6 @@ pub struct Renderer {
     refining: Option<Refining>,
     march_pace: Pace,
     reproject_pace: Pace,
-    cell_pace: Pace,
     pixel_pace: Pace,
     shadow_pace: Pace,
     /// Milliseconds on the GPU by kernel, for the last picture or answer.
@@ -106,14 +105,20 @@ impl Method {
         let high = params.high_clouds.coverage > 0.0;
         let high = high.then(|| ("high_clouds", high_clouds::kernel(&params.high_clouds)));
         let bakes = high.into_iter().chain(BAKES).map(|(pass, entry)| (pass, entry, Variant::bake()));
-        let composite = ("composite", "composite", composite::variant(variant, frame, layers));
+        let composite: &[_] = if self.by_cells(frame, quality) { &composite::CELLS } else { &composite::WHOLE };
+        let composite = composite.iter().map(with(composite::variant(variant, frame, layers)));
         let clouds = clouds.iter().map(with(variant));
         bakes
             .chain(shadow::kernels(frame, variant))
             .chain(beams::kernel(variant))
             .chain(clouds)
-            .chain([composite])
+            .chain(composite)
             .collect()
+    }
+
+    /// Whether what is behind the clouds is worked out by cells.
+    fn by_cells(self, frame: &Frame, quality: &Quality) -> bool {
+        self == Self::March && composite::by_cells(frame, quality)
     }
 
     /// Whether there is nothing to march.
@@ -137,6 +142,7 @@ struct Still {
     refined: Refined,
     marched: Marched,
     composed: Composed,
+    backdrop: Backdrop,
     rays: Option<Rays>,
 }
 
@@ -199,7 +205,6 @@ impl Renderer {
             refining: None,
             march_pace: pace,
             reproject_pace: pace,
-            cell_pace: pace,
             pixel_pace: pace,
             // Its texels may take many times as long as a pixel's march.
             shadow_pace: Pace::new(if gpu.info.kind == "cpu" { 1e4 } else { 1e6 }),
@@ -219,13 +224,12 @@ impl Renderer {
         let mut add = |owner, bindings: Bindings<'_>| {
             held.extend(bindings.into_iter().map(|(name, binding)| (owner, name, binding.bytes())));
         };
-        if let Some(Still { refined, marched, composed, rays, .. }) = &self.still {
-            add("still", [marched.bindings(), refined.bindings(), composed.bindings()].concat());
+        if let Some(Still { refined, marched, composed, backdrop, rays, .. }) = &self.still {
+            add("still", [marched.bindings(), refined.bindings(), composed.bindings(), backdrop.bindings()].concat());
             add("still", rays.as_ref().map_or(Vec::new(), |rays| rays.bindings("rays")));
         }
         if let Some(Animation { refined, fresh, before, now, composed, backdrop, scene_before, .. }) = &self.animation {
-            add("animation", [fresh.bindings(), refined.bindings(), composed.bindings()].concat());
-            add("animation", backdrop.bindings());
+            add("animation", [fresh.bindings(), refined.bindings(), composed.bindings(), backdrop.bindings()].concat());
             add("animation", vec![("scene_before", scene_before.depth())]);
             add("animation", [before.bindings(), now.bindings()].concat());
         }
@@ -299,6 +303,7 @@ impl Renderer {
         })?;
 
         let lattice = refine::coarsest(&frame, quality) > 1;
+        let by_cells = method.by_cells(&frame, quality);
         let mut picture = Picture::default();
         for sheet in sheets([width, height], method) {
             frame.sheet_row = sheet.start;
@@ -308,7 +313,7 @@ impl Renderer {
             frame.sheet_rows = frame.rows + shared;
             let pixels = u64::from(width) * u64::from(frame.sheet_rows);
             if self.still.as_ref().is_none_or(|still| still.pixels < pixels || still.method != method) {
-                self.still = Some(Still::new(gpu, pixels, method));
+                self.still = Some(Still::new(gpu, [width, frame.sheet_rows], method));
             }
             let Some(still) = &self.still else { unreachable!("was just made") };
             if let Some(given) = &scene_depth {
@@ -330,34 +335,32 @@ impl Renderer {
                     march_sheet(&mut ctx, &scene, &mut frame, quality, pace, &still.refined, &still.marched)?;
                 }
             }
-            in_bands(&mut self.pixel_pace, gpu, &scene, &mut frame, [width, sheet.end], |frame| {
-                let mut work = gpu.work();
-                let marched = &still.marched;
-                composite::run(gpu, &mut work, &scene, frame, marched, &still.composed, all)?;
-                let first = u64::from(width) * u64::from(frame.first_row - frame.sheet_row);
-                let pixels = u64::from(width) * u64::from(frame.rows);
-                let layer = |work: &mut Work<'_>, buffer, bytes| work.download(buffer, bytes * first, bytes * pixels);
-                layer(&mut work, &still.composed.image, 16);
-                if all {
-                    layer(&mut work, &still.composed.sky, 16);
-                    layer(&mut work, &still.composed.depth, 4);
-                    layer(&mut work, &marched.samples, 4);
-                    if let Some(rays) = &still.rays {
-                        layer(&mut work, &rays.uncertainty, 16);
-                    }
+            let Still { marched, refined, composed, backdrop, rays, .. } = still;
+            let parts = Parts { marched, backdrop, refined, out: composed };
+            frame.rows = sheet.len() as u32;
+            let mut ctx = Context { gpu, uniforms: scene.uniforms, variant: scene.variant, timings, interrupt };
+            compose_sheet(&mut ctx, &scene, &mut frame, &mut self.pixel_pace, &parts, by_cells, all)?;
+            let mut work = gpu.work();
+            let pixels = u64::from(width) * sheet.len() as u64;
+            work.download(&composed.image, 0, 16 * pixels);
+            if all {
+                work.download(&composed.sky, 0, 16 * pixels);
+                work.download(&composed.depth, 0, 4 * pixels);
+                work.download(&marched.samples, 0, 4 * pixels);
+                if let Some(rays) = rays {
+                    work.download(&rays.uncertainty, 0, 16 * pixels);
                 }
-                let downloads = work.submit(timings, interrupt)?;
-                picture.image.extend_from_slice(downloads[0].numbers());
-                if all {
-                    picture.sky.extend_from_slice(downloads[1].numbers());
-                    picture.depth.extend_from_slice(downloads[2].numbers());
-                    picture.samples.extend_from_slice(downloads[3].numbers());
-                    if let Some(uncertainty) = downloads.get(4) {
-                        picture.uncertainty.extend_from_slice(uncertainty.numbers());
-                    }
+            }
+            let downloads = work.submit(timings, interrupt)?;
+            picture.image.extend_from_slice(downloads[0].numbers());
+            if all {
+                picture.sky.extend_from_slice(downloads[1].numbers());
+                picture.depth.extend_from_slice(downloads[2].numbers());
+                picture.samples.extend_from_slice(downloads[3].numbers());
+                if let Some(uncertainty) = downloads.get(4) {
+                    picture.uncertainty.extend_from_slice(uncertainty.numbers());
                 }
-                Ok(())
-            })?;
+            }
         }
         gpu.pipelines.store();
         Ok(picture)
@@ -480,33 +483,11 @@ impl Renderer {
             let mut ctx = Context { gpu, uniforms: scene.uniforms, variant: scene.variant, timings, interrupt };
             march_listed(&mut ctx, &scene, &mut frame, rays, &mut self.march_pace, refined, now)?;
         }
-        // What stands still becomes the still.
-        let by_cells = frame.moving > 0 && composite::by_cells(&frame);
-        if by_cells {
-            let mut work = gpu.work();
-            work.clear(&refined.count);
-            composite::backdrop(gpu, &mut work, &scene, &frame, backdrop)?;
-            work.submit(timings, interrupt)?;
-            let mut pixels = 0;
-            in_bands(&mut self.cell_pace, gpu, &scene, &mut frame, [width, height], |frame| {
-                let mut work = gpu.work();
-                composite::run_cells(gpu, &mut work, &scene, frame, now, backdrop, refined, composed)?;
-                work.download(&refined.count, 0, 4);
-                pixels = work.submit(timings, interrupt)?[0].numbers()[0];
-                Ok(())
-            })?;
-            in_list(&mut self.pixel_pace, gpu, &scene, &mut frame, pixels, |frame| {
-                let mut work = gpu.work();
-                composite::run_list(gpu, &mut work, &scene, frame, now, refined, composed)?;
-                work.submit(timings, interrupt).map(drop)
-            })?;
-        } else {
-            in_bands(&mut self.pixel_pace, gpu, &scene, &mut frame, [width, height], |frame| {
-                let mut work = gpu.work();
-                composite::run(gpu, &mut work, &scene, frame, now, composed, false)?;
-                work.submit(timings, interrupt).map(drop)
-            })?;
-        }
+        frame.rows = height;
+        let parts = Parts { marched: now, backdrop, refined, out: composed };
+        let mut ctx = Context { gpu, uniforms: scene.uniforms, variant: scene.variant, timings, interrupt };
+        let by_cells = Method::March.by_cells(&frame, quality);
+        compose_sheet(&mut ctx, &scene, &mut frame, &mut self.pixel_pace, &parts, by_cells, false)?;
         let mut work = gpu.work();
         work.download(&composed.image, 0, 16 * pixels);
         let image = work.submit(timings, interrupt)?[0].numbers().to_vec();
@@ -870,7 +851,8 @@ impl World {
 }
 
 impl Still {
-    fn new(gpu: &Gpu, pixels: u64, method: Method) -> Self {
+    fn new(gpu: &Gpu, size: [u32; 2], method: Method) -> Self {
+        let pixels = size.map(u64::from).iter().product();
         let ray_bytes = match method {
             Method::March => None,
             Method::Reference => Some(reference::RAY_BYTES),
@@ -882,6 +864,7 @@ impl Still {
             refined: Refined::new(gpu, pixels),
             marched: Marched::new(gpu, pixels),
             composed: Composed::new(gpu, pixels),
+            backdrop: Backdrop::new(gpu, size),
             rays: ray_bytes.map(|bytes| Rays::new(gpu, pixels, bytes)),
         }
     }
@@ -1000,6 +983,38 @@ fn march_listed(
     in_list(pace, gpu, scene, frame, rays, |frame| {
         let mut work = gpu.work();
         march::run_list(gpu, &mut work, scene, frame, refined, out)?;
+        work.submit(ctx.timings, interrupt).map(drop)
+    })
+}
+
+/// Composes the sheet of `frame`: cells, then the pixels of those that are not smooth, or all of them.
+fn compose_sheet(
+    ctx: &mut Context<'_>,
+    scene: &Scene<'_>,
+    frame: &mut Frame,
+    pace: &mut Pace,
+    parts: &Parts<'_>,
+    by_cells: bool,
+    layers: bool,
+) -> Result<()> {
+    let (gpu, interrupt) = (ctx.gpu, ctx.interrupt);
+    if !by_cells {
+        let size = [frame.width, frame.sheet_row + frame.rows];
+        return in_bands(pace, gpu, scene, frame, size, |frame| {
+            let mut work = gpu.work();
+            composite::run(gpu, &mut work, scene, frame, parts, layers)?;
+            work.submit(ctx.timings, interrupt).map(drop)
+        });
+    }
+    // All at once: the corners are few, and a cell costs little.
+    scene.uniforms.upload_frame(gpu, frame);
+    let mut work = gpu.work();
+    composite::run_cells(gpu, &mut work, scene, frame, parts, layers)?;
+    work.download(&parts.refined.count, 0, 4);
+    let cells: u32 = work.submit(ctx.timings, interrupt)?[0].numbers()[0];
+    in_list(pace, gpu, scene, frame, cells * TILE * TILE, |frame| {
+        let mut work = gpu.work();
+        composite::run_list(gpu, &mut work, scene, frame, parts, layers)?;
         work.submit(ctx.timings, interrupt).map(drop)
     })
 }

@@ -26,9 +26,11 @@ const HIGH_FADE = 100.0;
 
 // Pixels of a cell in each direction (as in composite.rs).
 const TILE = 4u;
-// Second difference of radiance and transmittance from corner to corner past which each pixel of a cell is worked out, as a
-// share of the brightest.
-const SMOOTH = 0.05;
+// Second difference of radiance and transmittance between corners of cells past which each pixel of a cell is worked out: as a
+// share of the contrast past which clouds are marched, of the brightest corner. What is smooth errs by an eighth of it.
+const CURVATURE = 0.1;
+// What stands for the distance of high clouds where a cell may hide an edge, m.
+const EDGE = 1e30;
 
 // Luminance of Rec. 709 red, green and blue.
 const LUMINANCE = vec3f(0.2126, 0.7152, 0.0722);
@@ -62,127 +64,145 @@ fn compose(pixel: vec2u) {
     }
     var here = Layer(vec3f(0.0), 1.0, 0.0);
     if !CLOUDLESS {
-        let cloud = clouds[index];
-        here = Layer(cloud.rgb, cloud.a, max(cloud_depth[index], 0.0));
+        here = marched_layer(index);
     }
-    let sight = sight_of(view.xyz, pixel, here);
+    put(index, sight_of(view.xyz, pixel, scene_distance(pixel), here));
+}
+
+// What has been marched, its distance as it is.
+fn marched_layer(index: u32) -> Layer {
+    let cloud = clouds[index];
+    return Layer(cloud.rgb, cloud.a, max(cloud_depth[index], 0.0));
+}
+
+fn put(index: u32, sight: Sight) {
     if LAYERS {
         sky[index] = vec4f(sight.background, 1.0);
         let covered = 1.0 - sight.seen.transmittance;
         depth[index] = select(-1.0, sight.seen.distance / covered, covered > 0.0);
     }
-    image[index] = picture_of(sight);
+    let whole = vec4f(sight.seen.radiance + sight.seen.transmittance * sight.background, sight.opacity);
+    image[index] = select(vec4f(sight.seen.radiance, 1.0 - sight.seen.transmittance), whole, frame.background > 0u);
 }
 
-// What is behind the marched clouds at every fourth pixel, in both directions, from the first to the first past the last.
+// What is behind the marched clouds is smooth nearly everywhere: it is worked out at the corners of cells, and between them
+// where it bends.
+
+fn cell_columns() -> u32 {
+    return (frame.width + TILE - 1u) / TILE;
+}
+
+// Cells have a corner more than there are in each direction, and their neighbours one on either side.
+fn corner_index(corner: vec2u) -> u32 {
+    return corner.y * (cell_columns() + 3u) + corner.x;
+}
+
+// What is behind the marched clouds, and the user's scene, at the corners of the cells of a sheet and of those around it.
 @compute @workgroup_size(8, 8)
 fn backdrop(@builtin(global_invocation_id) id: vec3u) {
-    let size = (vec2u(frame.width, frame.height) + TILE - 1u) / TILE + 1u;
-    if any(id.xy >= size) {
+    if id.x >= cell_columns() + 3u || id.y >= (frame.rows + TILE - 1u) / TILE + 3u {
         return;
     }
-    let index = id.y * size.x + id.x;
-    let pixel = id.xy * TILE;
-    let view = view_direction(vec2f(pixel) + 0.5);
-    let sight = sight_of(view.xyz, min(pixel, vec2u(frame.width, frame.height) - 1u), Layer(vec3f(0.0), 1.0, 0.0));
-    let opacity = 1.0 - sight.seen.transmittance;
-    var distance = sight.seen.distance / max(opacity, 1e-6);
-    // The sun's disc may lie between the corners of a cell.
+    let pixel = (vec2f(id.xy) - 1.0) * f32(TILE) + vec2f(0.0, f32(frame.sheet_row));
+    let view = view_direction(pixel + 0.5);
+    let sight = sight_of(view.xyz, vec2u(0u, frame.sheet_row), NO_SCENE, Layer(vec3f(0.0), 1.0, 0.0));
+    // Below zero on the ground.
+    var distance = select(sight.seen.distance, -1.0 - sight.seen.distance, hit_sphere(view.xyz, frame.power_ground).enters);
+    // The sun's disc may lie between corners.
     let near_sun = SUN_RADIUS + f32(2u * TILE) * pixel_width();
     if view.w == 0.0 || one_minus_cos(view.xyz, frame.sun_direction) < 0.5 * near_sun * near_sun {
-        distance = -1.0;
+        distance = EDGE;
     }
-    backdrop_high[index] = vec4f(sight.seen.radiance, sight.seen.transmittance);
-    backdrop_sky[index] = vec4f(sight.background, distance);
+    let high = vec4f(sight.seen.radiance, sight.seen.transmittance);
+    corners[corner_index(id.xy)] = mat2x4f(high, vec4f(sight.background, distance));
 }
 
-// Puts the clouds of a cell before what lies behind its corners, where these look alike; else it lists its pixels.
+// Puts the clouds of a cell before what lies behind them, or lists it.
 @compute @workgroup_size(8, 8)
 fn composite_cells(@builtin(global_invocation_id) id: vec3u) {
-    let columns = (frame.width + TILE - 1u) / TILE;
-    let corner = vec2u(id.x * TILE, frame.first_row + id.y * TILE);
-    if id.x >= columns || corner.y >= frame.first_row + frame.rows {
+    let columns = cell_columns();
+    if id.x >= columns || id.y >= (frame.rows + TILE - 1u) / TILE {
         return;
     }
-    let first = corner.y / TILE * (columns + 1u) + id.x;
-    let corners = vec4u(first, first + 1u, first + columns + 1u, first + columns + 2u);
-    let high = mat4x4f(
-        backdrop_high[corners[0]],
-        backdrop_high[corners[1]],
-        backdrop_high[corners[2]],
-        backdrop_high[corners[3]],
-    );
-    let sky = mat4x4f(
-        backdrop_sky[corners[0]],
-        backdrop_sky[corners[1]],
-        backdrop_sky[corners[2]],
-        backdrop_sky[corners[3]],
-    );
-    let last = vec2i(vec2u(columns, (frame.height + TILE - 1u) / TILE));
-    // Whether it is smooth shows at the corners of the cells around too: high clouds near the horizon are lower than a cell.
-    // What bends from one to the next by so much, interpolation misses by an eighth of that, if it is smooth.
-    var before: mat4x4f;
-    var earlier: mat4x4f;
+    let first = vec2u(id.x * TILE, frame.sheet_row + id.y * TILE);
+    var high: mat4x4f; // of the four corners
+    var behind: mat4x4f;
     var bend = vec4f(0.0);
     var brightest = 0.0;
-    var nearest = 0.0;
-    var k = 0;
+    var nearest = EDGE;
+    var farthest = -EDGE;
+    // It shows at the corners of the cells around too: high clouds near the horizon are lower than a cell.
+    var before: mat4x4f;
+    var earlier: mat4x4f;
+    var k = 0u;
     loop {
         var row: mat4x4f;
-        for (var j = 0; j < 4; j++) {
-            let at = vec2u(clamp(vec2i(corner / TILE) + vec2i(j, k) - 1, vec2i(0), last));
-            let one = at.y * (columns + 1u) + at.x;
-            let layer = backdrop_high[one];
-            let behind = backdrop_sky[one];
-            row[j] = vec4f(layer.rgb + layer.a * behind.rgb, layer.a);
+        for (var j = 0u; j < 4u; j++) {
+            let both = corners[corner_index(id.xy + vec2u(j, k))];
+            let layer = both[0];
+            let sky = both[1];
+            row[j] = vec4f(layer.rgb + layer.a * sky.rgb, layer.a);
             brightest = max(brightest, max(max(row[j].r, row[j].g), row[j].b));
-            nearest = min(nearest, behind.a);
+            if (j == 1u || j == 2u) && (k == 1u || k == 2u) {
+                let corner = 2u * (k - 1u) + j - 1u;
+                high[corner] = layer;
+                behind[corner] = sky;
+                nearest = min(nearest, sky.a);
+                farthest = max(farthest, sky.a);
+            }
         }
-        let across = max(abs(row[0] - 2.0 * row[1] + row[2]), abs(row[1] - 2.0 * row[2] + row[3]));
-        bend = max(bend, across);
-        if k >= 2 {
-            for (var j = 0; j < 4; j++) {
+        bend = max(bend, max(abs(row[0] - 2.0 * row[1] + row[2]), abs(row[1] - 2.0 * row[2] + row[3])));
+        if k >= 2u {
+            for (var j = 0u; j < 4u; j++) {
                 bend = max(bend, abs(row[j] - 2.0 * before[j] + earlier[j]));
             }
         }
-        if k == 3 {
+        if k == 3u {
             break;
         }
         earlier = before;
         before = row;
         k++;
     }
-    var alike = nearest >= 0.0 && all(bend <= SMOOTH * vec4f(vec3f(brightest), 1.0));
+    // The horizon is an edge, however bright.
+    var smooth_cell = farthest < EDGE && (nearest < 0.0) == (farthest < 0.0)
+        && all(bend <= CURVATURE * quality.contrast * vec4f(vec3f(brightest), 1.0));
     if SCENE {
-        alike = alike && nearest_scene(corner) >= NO_SCENE;
+        smooth_cell = smooth_cell && nearest_scene(first) >= NO_SCENE;
+    }
+    if !smooth_cell {
+        active_rays[atomicAdd(&ray_count, 1u)] = id.y * columns + id.x;
+        return;
     }
     var i = 0u;
     loop {
         let place = vec2u(i % TILE, i / TILE);
-        let pixel = corner + place;
-        if all(pixel < vec2u(frame.width, frame.height)) {
-            let index = pixel.y * frame.width + pixel.x;
+        let pixel = first + place;
+        if all(pixel < vec2u(frame.width, frame.sheet_row + frame.rows)) {
+            let index = (pixel.y - frame.sheet_row) * frame.width + pixel.x;
             let share = vec2f(place) / f32(TILE);
-            let shares = vec4f((1.0 - share.x) * (1.0 - share.y), share.x * (1.0 - share.y), (1.0 - share.x) * share.y, share.x * share.y);
-            let far = high * shares;
-            let behind = sky * shares;
-            var here = Layer(vec3f(0.0), 1.0, 0.0);
+            let rest = 1.0 - share;
+            let shares = vec4f(rest.x * rest.y, share.x * rest.y, rest.x * share.y, share.x * share.y);
+            let layer = high * shares;
+            let sky = behind * shares;
+            let far = Layer(layer.rgb, layer.a, select(sky.a, -1.0 - sky.a, sky.a < 0.0));
+            var seen = far;
             if !CLOUDLESS {
-                let cloud = clouds[index];
-                here = Layer(cloud.rgb, cloud.a, max(cloud_depth[index], 0.0));
+                let here = marched_layer(index);
+                let depth = far.distance / max(1.0 - far.transmittance, 1e-6);
+                let near = Layer(here.radiance, here.transmittance, (1.0 - here.transmittance) * here.distance);
+                seen = over(near, far);
+                if HIGH {
+                    let under = over(far, near);
+                    let first = depth < here.distance;
+                    seen = Layer(
+                        select(seen.radiance, under.radiance, first),
+                        seen.transmittance,
+                        select(seen.distance, under.distance, first),
+                    );
+                }
             }
-            var layer = Layer(far.rgb, far.a, behind.a);
-            let under = layer.distance < here.distance;
-            if alike {
-                let seen = Layer(
-                    select(here.radiance + here.transmittance * layer.radiance, layer.radiance + layer.transmittance * here.radiance, under),
-                    here.transmittance * layer.transmittance,
-                    0.0,
-                );
-                image[index] = picture_of(Sight(seen, behind.rgb, 1.0));
-            } else {
-                active_rays[atomicAdd(&ray_count, 1u)] = index;
-            }
+            put(index, Sight(seen, sky.rgb, 1.0));
         }
         if i == TILE * TILE - 1u {
             break;
@@ -191,28 +211,29 @@ fn composite_cells(@builtin(global_invocation_id) id: vec3u) {
     }
 }
 
-fn nearest_scene(corner: vec2u) -> f32 {
+// How near the user's scene comes in a cell.
+fn nearest_scene(first: vec2u) -> f32 {
+    let last = vec2u(frame.width, frame.sheet_row + frame.rows) - 1u;
     var nearest = NO_SCENE;
-    var i = 0u;
-    loop {
-        let pixel = min(corner + vec2u(i % TILE, i / TILE), vec2u(frame.width, frame.height) - 1u);
-        nearest = min(nearest, scene_distance(pixel));
-        if i == TILE * TILE - 1u {
-            break;
-        }
-        i++;
+    for (var i = 0u; i < TILE * TILE; i++) {
+        nearest = min(nearest, scene_distance(min(first + vec2u(i % TILE, i / TILE), last)));
     }
     return nearest;
 }
 
-// The pixels of the list.
+// The pixels of the cells of the list.
 @compute @workgroup_size(64)
 fn composite_list(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= frame.active_rays {
         return;
     }
-    let index = active_rays[frame.first_ray + id.x];
-    compose(vec2u(index % frame.width, index / frame.width));
+    let number = frame.first_ray + id.x;
+    let cell = active_rays[number / (TILE * TILE)];
+    let i = number % (TILE * TILE);
+    let pixel = TILE * vec2u(cell % cell_columns(), cell / cell_columns()) + vec2u(i % TILE, i / TILE);
+    if all(pixel < vec2u(frame.width, frame.rows)) {
+        compose(pixel + vec2u(0u, frame.sheet_row));
+    }
 }
 
 // What a pixel sees: all clouds, what is behind them, and how much of that is ours to say.
@@ -222,14 +243,8 @@ struct Sight {
     opacity: f32,
 }
 
-fn picture_of(sight: Sight) -> vec4f {
-    let whole = vec4f(sight.seen.radiance + sight.seen.transmittance * sight.background, sight.opacity);
-    return select(vec4f(sight.seen.radiance, 1.0 - sight.seen.transmittance), whole, frame.background > 0u);
-}
-
-// What is seen in a direction, with the clouds that were marched there.
-fn sight_of(direction: vec3f, pixel: vec2u, here: Layer) -> Sight {
-    let scene = scene_distance(pixel);
+// What is seen in a direction, with the clouds that were marched there, to the user's scene at a pixel.
+fn sight_of(direction: vec3f, pixel: vec2u, scene: f32, here: Layer) -> Sight {
     let ground = hit_sphere(direction, frame.power_ground);
     var way = Way(0.0, 0.0, ground.enters);
     var texels = AirTexels(vec2f(0.0), vec2f(0.0));

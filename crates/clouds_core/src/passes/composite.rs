@@ -7,9 +7,18 @@ use crate::error::Result;
 use crate::frame::Frame;
 use crate::gpu::{Gpu, Work};
 use crate::kernel::Variant;
+use crate::params::Quality;
 
 /// Pixels of a cell in each direction (as in composite.wgsl).
-const CELL: u32 = 4;
+pub(crate) const TILE: u32 = 4;
+
+/// What a picture is composed of, and into.
+pub(crate) struct Parts<'a> {
+    pub marched: &'a Marched,
+    pub backdrop: &'a Backdrop,
+    pub refined: &'a Refined,
+    pub out: &'a Composed,
+}
 
 /// The picture, of a band or whole.
 pub(crate) struct Composed {
@@ -35,72 +44,71 @@ impl Composed {
     }
 }
 
-/// What is behind the marched clouds at the corners of cells of pixels.
+/// What is behind the marched clouds at the corners of the cells of a sheet, and of those around it.
 pub(crate) struct Backdrop {
-    /// Radiance and transmittance of the high clouds.
-    pub high: wgpu::Buffer,
-    /// Radiance of the sky behind them, and their distance.
-    pub sky: wgpu::Buffer,
+    pub corners: wgpu::Buffer,
 }
 
 impl Backdrop {
     pub fn new(gpu: &Gpu, size: [u32; 2]) -> Self {
-        let [columns, rows] = size.map(|n| u64::from(n.div_ceil(CELL) + 1));
-        Self {
-            high: gpu.buffer("backdrop_high", 16 * columns * rows),
-            sky: gpu.buffer("backdrop_sky", 16 * columns * rows),
-        }
+        Self { corners: gpu.buffer("corners", 32 * corners(size).map(u64::from).iter().product::<u64>()) }
     }
 
     pub fn bindings(&self) -> Bindings<'_> {
-        vec![("backdrop_high", (&self.high).into()), ("backdrop_sky", (&self.sky).into())]
+        vec![("corners", (&self.corners).into())]
     }
 }
 
-/// Whether what is behind the clouds can be worked out by cells: where these are narrow, and the high clouds are a single
-/// layer, as they are from below.
-pub(crate) fn by_cells(frame: &Frame) -> bool {
-    let below = frame.high_clouds == 0 || frame.power_high <= 0.0;
-    below && CELL as f32 * frame.marched_angle() / frame.stride as f32 <= WIDEST
+fn corners(size: [u32; 2]) -> [u32; 2] {
+    size.map(|pixels| pixels.div_ceil(TILE) + 3)
 }
 
-/// Works out what is behind the clouds, of the whole picture.
-pub(crate) fn backdrop(gpu: &Gpu, work: &mut Work<'_>, scene: &Scene<'_>, frame: &Frame, out: &Backdrop) -> Result<()> {
-    let bindings = [scene.bindings.as_slice(), &out.bindings()].concat();
-    let kernel = gpu.kernel("composite", "backdrop", variant(scene.variant, frame, false))?;
-    work.dispatch(&kernel, &bindings, [frame.width.div_ceil(CELL) + 1, frame.height.div_ceil(CELL) + 1, 1])
+/// The kernels where each pixel is worked out, and where cells are.
+pub(crate) const WHOLE: [(&str, &str); 1] = [("composite", "composite")];
+pub(crate) const CELLS: [(&str, &str); 3] =
+    [("composite", "backdrop"), ("composite", "composite_cells"), ("composite", "composite_list")];
+
+/// Whether what is behind the clouds is worked out by cells: where clouds are marched so, and cells as narrow as theirs. The
+/// high clouds are a single layer then, as they are from below.
+pub(crate) fn by_cells(frame: &Frame, quality: &Quality) -> bool {
+    let single = frame.high_clouds == 0 || frame.power_high <= 0.0;
+    quality.contrast > 0.0 && single && TILE as f32 * frame.marched_angle() / frame.stride as f32 <= WIDEST
 }
 
-/// Composes the cells of the band of `frame`, and lists the pixels of those that are not smooth.
-#[expect(clippy::too_many_arguments, reason = "what a picture is made of")]
+/// Composes the cells of the sheet of `frame`, and lists those that are not smooth.
 pub(crate) fn run_cells(
     gpu: &Gpu,
     work: &mut Work<'_>,
     scene: &Scene<'_>,
     frame: &Frame,
-    marched: &Marched,
-    backdrop: &Backdrop,
-    refined: &Refined,
-    out: &Composed,
+    parts: &Parts<'_>,
+    layers: bool,
 ) -> Result<()> {
-    let (marched, out) = (marched.bindings(), out.bindings());
-    let bindings = [scene.bindings.as_slice(), &marched, &backdrop.bindings(), &refined.bindings(), &out].concat();
-    let kernel = gpu.kernel("composite", "composite_cells", variant(scene.variant, frame, false))?;
-    work.dispatch(&kernel, &bindings, [frame.width.div_ceil(CELL), frame.rows.div_ceil(CELL), 1])
+    let Parts { marched, backdrop, refined, out } = parts;
+    let size = [frame.width, frame.rows];
+    let [columns, rows] = corners(size);
+    let bindings = [scene.bindings.as_slice(), &backdrop.bindings()].concat();
+    let kernel = gpu.kernel("composite", "backdrop", variant(scene.variant, frame, layers))?;
+    work.dispatch(&kernel, &bindings, [columns, rows, 1])?;
+    let bindings = [bindings, marched.bindings(), refined.bindings(), out.bindings()].concat();
+    let kernel = gpu.kernel("composite", "composite_cells", variant(scene.variant, frame, layers))?;
+    work.clear(&refined.count);
+    let [columns, rows] = size.map(|pixels| pixels.div_ceil(TILE));
+    work.dispatch(&kernel, &bindings, [columns, rows, 1])
 }
 
-/// Composes pixels of a list: `frame.active_rays` of them from `frame.first_ray` on.
+/// Composes pixels of the listed cells: `frame.active_rays` of them from `frame.first_ray` on.
 pub(crate) fn run_list(
     gpu: &Gpu,
     work: &mut Work<'_>,
     scene: &Scene<'_>,
     frame: &Frame,
-    marched: &Marched,
-    refined: &Refined,
-    out: &Composed,
+    parts: &Parts<'_>,
+    layers: bool,
 ) -> Result<()> {
+    let Parts { marched, refined, out, .. } = parts;
     let bindings = [scene.bindings.as_slice(), &marched.bindings(), &refined.bindings(), &out.bindings()].concat();
-    let kernel = gpu.kernel("composite", "composite_list", variant(scene.variant, frame, false))?;
+    let kernel = gpu.kernel("composite", "composite_list", variant(scene.variant, frame, layers))?;
     work.dispatch(&kernel, &bindings, [frame.active_rays, 1, 1])
 }
 
@@ -110,10 +118,10 @@ pub(crate) fn run(
     work: &mut Work<'_>,
     scene: &Scene<'_>,
     frame: &Frame,
-    marched: &Marched,
-    out: &Composed,
+    parts: &Parts<'_>,
     layers: bool,
 ) -> Result<()> {
+    let Parts { marched, out, .. } = parts;
     let bindings = [scene.bindings.as_slice(), &marched.bindings(), &out.bindings()].concat();
     let kernel = gpu.kernel("composite", "composite", variant(scene.variant, frame, layers))?;
     work.dispatch(&kernel, &bindings, [frame.width, frame.rows, 1])

@@ -29,6 +29,9 @@ const TILE = 4u;
 // Second difference of radiance and transmittance between corners of cells past which each pixel of a cell is worked out: as a
 // share of the contrast past which clouds are marched, of the brightest corner. What is smooth errs by an eighth of it.
 const CURVATURE = 0.1;
+// Most of the high clouds between corners, in tiles of their texture, and of shadows on the ground, in their texels.
+const FIBRE = 0.03;
+const SHADOW_EDGE = 2.0;
 // What stands for the distance of high clouds where a cell may hide an edge, m.
 const EDGE = 1e30;
 
@@ -106,15 +109,39 @@ fn backdrop(@builtin(global_invocation_id) id: vec3u) {
     let pixel = (vec2f(id.xy) - 1.0) * f32(TILE) + vec2f(0.0, f32(frame.sheet_row));
     let view = view_direction(pixel + 0.5);
     let sight = sight_of(view.xyz, vec2u(0u, frame.sheet_row), NO_SCENE, Layer(vec3f(0.0), 1.0, 0.0));
-    // Below zero on the ground.
-    var distance = select(sight.seen.distance, -1.0 - sight.seen.distance, hit_sphere(view.xyz, frame.power_ground).enters);
-    // The sun's disc may lie between corners.
-    let near_sun = SUN_RADIUS + f32(2u * TILE) * pixel_width();
-    if view.w == 0.0 || one_minus_cos(view.xyz, frame.sun_direction) < 0.5 * near_sun * near_sun {
+    let ground = hit_sphere(view.xyz, frame.power_ground);
+    var distance = select(sight.seen.distance, -1.0 - sight.seen.distance, ground.enters);
+    if view.w == 0.0 || hides_edge(view.xyz, ground) {
         distance = EDGE;
     }
     let high = vec4f(sight.seen.radiance, sight.seen.transmittance);
     corners[corner_index(id.xy)] = mat2x4f(high, vec4f(sight.background, distance));
+}
+
+// Whether corners so far apart may miss an edge between them: the sun's disc, and, toward the horizon, high clouds and shadows.
+fn hides_edge(direction: vec3f, ground: Hit) -> bool {
+    let near_sun = SUN_RADIUS + f32(2u * TILE) * pixel_width();
+    var hides = one_minus_cos(direction, frame.sun_direction) < 0.5 * near_sun * near_sun;
+    if HIGH {
+        let far = hit_sphere(direction, frame.power_high).far;
+        let across = cell_across(direction, far, params.high_clouds.altitude);
+        hides = hides || (!ground.enters && across > FIBRE * params.high_clouds.scale);
+    }
+    if GROUND_SHADOW {
+        let q = ground.near * direction.xy + frame.shadow_eye;
+        var fine = SHADOW_EDGE * shadow_texel(shadow_level(q, 0.0));
+        if HIGH {
+            fine = min(fine, FIBRE * params.high_clouds.scale);
+        }
+        hides = hides || (ground.enters && cell_across(direction, ground.near, 0.0) > fine);
+    }
+    return hides;
+}
+
+// How far a cell reaches along a sphere that its ray meets at a distance, m.
+fn cell_across(direction: vec3f, distance: f32, altitude: f32) -> f32 {
+    let cosine = abs(cos_zenith_along(direction, distance, altitude));
+    return distance * f32(TILE) * pixel_width() / max(cosine, 1e-6);
 }
 
 // Puts the clouds of a cell before what lies behind them, or lists it.
@@ -170,10 +197,8 @@ fn composite_cells(@builtin(global_invocation_id) id: vec3u) {
     if SCENE {
         smooth_cell = smooth_cell && nearest_scene(first) >= NO_SCENE;
     }
-    if !smooth_cell {
-        active_rays[atomicAdd(&ray_count, 1u)] = id.y * columns + id.x;
-        return;
-    }
+    // Nor does it matter what opaque clouds hide, but to who asks for the sky.
+    var hidden = !LAYERS && !CLOUDLESS && (!HIGH || (!VOLUME && frame.shell_top <= params.high_clouds.altitude));
     var i = 0u;
     loop {
         let place = vec2u(i % TILE, i / TILE);
@@ -189,6 +214,7 @@ fn composite_cells(@builtin(global_invocation_id) id: vec3u) {
             var seen = far;
             if !CLOUDLESS {
                 let here = marched_layer(index);
+                hidden = hidden && here.transmittance == 0.0;
                 let depth = far.distance / max(1.0 - far.transmittance, 1e-6);
                 let near = Layer(here.radiance, here.transmittance, (1.0 - here.transmittance) * here.distance);
                 seen = over(near, far);
@@ -208,6 +234,9 @@ fn composite_cells(@builtin(global_invocation_id) id: vec3u) {
             break;
         }
         i++;
+    }
+    if !smooth_cell && !hidden {
+        active_rays[atomicAdd(&ray_count, 1u)] = id.y * columns + id.x;
     }
 }
 

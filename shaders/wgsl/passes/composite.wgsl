@@ -30,7 +30,7 @@ const TILE = 4u;
 // share of the contrast past which clouds are marched, of the brightest corner. What is smooth errs by an eighth of it.
 const CURVATURE = 0.1;
 // Most of the high clouds between corners, in tiles of their texture, and of shadows on the ground, in their texels.
-const FIBRE = 0.03;
+const FIBRE = 0.02;
 const SHADOW_EDGE = 2.0;
 // What stands for the distance of high clouds where a cell may hide an edge, m.
 const EDGE = 1e30;

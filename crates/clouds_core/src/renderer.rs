@@ -17,7 +17,7 @@ use crate::kernel::{Binding, Kernel, Variant, Wanted};
 use crate::params::{self, Model, Params, Quality};
 use crate::passes::beams::{self, Beams};
 use crate::passes::broad_weather::BroadWeather;
-use crate::passes::composite::{Backdrop, TILE, Composed, Parts};
+use crate::passes::composite::{Backdrop, Composed, Parts, TILE};
 use crate::passes::high_clouds::{self, HighClouds};
 use crate::passes::majorant::Majorants;
 use crate::passes::march::Marched;

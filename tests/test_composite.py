@@ -65,7 +65,7 @@ VIEWS = {
 
 @pytest.mark.parametrize("view", VIEWS)
 def test_cells_cost_little_error(view):
-    """1 % of the mean radiance and transmittance; 5 % of a pixel but for one in 5000; 20 % at most."""
+    """1 % of the mean radiance and transmittance, 5 % of a pixel but for one in 5000, 20 % of any."""
     camera, params, size = VIEWS[view]
     full, few = both(camera, params, size=size)
     for name in "sky", "transmittance":

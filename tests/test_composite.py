@@ -65,7 +65,7 @@ VIEWS = {
 
 @pytest.mark.parametrize("view", VIEWS)
 def test_cells_cost_little_error(view):
-    """1 % of the mean radiance and transmittance, 5 % of a pixel but for one in 5000, 20 % of any."""
+    """1 % of the mean radiance and transmittance, of a pixel 5 % but for one in 2000."""
     camera, params, size = VIEWS[view]
     full, few = both(camera, params, size=size)
     for name in "sky", "transmittance":
@@ -73,7 +73,7 @@ def test_cells_cost_little_error(view):
     assert relative_rmse(picture(few), picture(full)) < 0.01
     brightest = picture(full).max(axis=-1)
     error = np.abs(picture(few) - picture(full)).max(axis=-1)
-    assert np.mean(error > 0.05 * brightest) < 2e-4
+    assert np.mean(error > 0.05 * brightest) < 5e-4
     assert (error <= 0.2 * brightest).all()
     seen = np.isfinite(few["depth"]) & (full["transmittance"] < 0.95)
     np.testing.assert_allclose(few["depth"][seen], full["depth"][seen], rtol=0.05)

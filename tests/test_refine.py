@@ -104,7 +104,10 @@ def test_sizes_that_four_does_not_divide(size):
     full, few = (layers(size, contrast, "overcast", "draft") for contrast in (0.0, 0.2))
     rows, columns = np.ix_(lattice(size[1]), lattice(size[0]))
     for name, expected in full.items():
-        assert np.array_equal(few[name][rows, columns], expected[rows, columns]), name
+        if name == "sky":  # interpolated too (test_composite.py)
+            np.testing.assert_allclose(few[name], expected, rtol=0.01)
+        else:
+            assert np.array_equal(few[name][rows, columns], expected[rows, columns]), name
         assert not np.isnan(few[name]).any()
     assert (few["radiance"] > 0).all(axis=-1).any()
 

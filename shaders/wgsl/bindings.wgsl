@@ -72,6 +72,10 @@ override LIGHT_CHEAP: bool = true; // there are light samples that do not
 @group(0) @binding(16) var<storage, read_write> sky: array<vec4f>; // radiance without clouds
 @group(0) @binding(29) var<storage, read_write> depth: array<f32>; // of all clouds together, -1 where none
 
+// What is behind the marched clouds at the corners of cells (passes/composite): the high clouds as `clouds`, and the
+// radiance of sky and ground with the distance of those times their opacity, m; that less than 0 on the ground.
+@group(0) @binding(55) var<storage, read_write> corners: array<mat2x4f>;
+
 // Temporal reprojection: the marched subset, and the frame before.
 @group(0) @binding(17) var<storage, read_write> fresh: array<vec4f>;
 @group(0) @binding(18) var<storage, read_write> fresh_depth: array<f32>;

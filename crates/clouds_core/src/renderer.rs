@@ -12,12 +12,12 @@ use crate::blue_noise;
 use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
-use crate::gpu::{Gpu, Interrupt, Timings, Work, check_fork};
+use crate::gpu::{Gpu, Interrupt, Timings, check_fork};
 use crate::kernel::{Binding, Kernel, Variant, Wanted};
 use crate::params::{self, Model, Params, Quality};
 use crate::passes::beams::{self, Beams};
 use crate::passes::broad_weather::BroadWeather;
-use crate::passes::composite::Composed;
+use crate::passes::composite::{Backdrop, Composed, Parts, TILE};
 use crate::passes::display::{self, Screen};
 use crate::passes::high_clouds::{self, HighClouds};
 use crate::passes::majorant::Majorants;
@@ -106,14 +106,20 @@ impl Method {
         let high = params.high_clouds.coverage > 0.0;
         let high = high.then(|| ("high_clouds", high_clouds::kernel(&params.high_clouds)));
         let bakes = high.into_iter().chain(BAKES).map(|(pass, entry)| (pass, entry, Variant::bake()));
-        let composite = ("composite", "composite", composite::variant(variant, frame, layers));
+        let composite: &[_] = if self.by_cells(frame, quality) { &composite::CELLS } else { &composite::WHOLE };
+        let composite = composite.iter().map(with(composite::variant(variant, frame, layers)));
         let clouds = clouds.iter().map(with(variant));
         bakes
             .chain(shadow::kernels(frame, variant))
             .chain(beams::kernel(variant))
             .chain(clouds)
-            .chain([composite])
+            .chain(composite)
             .collect()
+    }
+
+    /// Whether what is behind the clouds is worked out by cells.
+    fn by_cells(self, frame: &Frame, quality: &Quality) -> bool {
+        self == Self::March && composite::by_cells(frame, quality)
     }
 
     /// Whether there is nothing to march.
@@ -137,6 +143,7 @@ struct Still {
     refined: Refined,
     marched: Marched,
     composed: Composed,
+    backdrop: Backdrop,
     rays: Option<Rays>,
 }
 
@@ -161,6 +168,7 @@ struct Animation {
     before: Marched,
     now: Marched,
     composed: Composed,
+    backdrop: Backdrop,
     scene_before: SceneTextures,
     last: Option<Shot>,
 }
@@ -214,12 +222,12 @@ impl Renderer {
         let mut add = |owner, bindings: Bindings<'_>| {
             held.extend(bindings.into_iter().map(|(name, binding)| (owner, name, binding.bytes())));
         };
-        if let Some(Still { refined, marched, composed, rays, .. }) = &self.still {
-            add("still", [marched.bindings(), refined.bindings(), composed.bindings()].concat());
+        if let Some(Still { refined, marched, composed, backdrop, rays, .. }) = &self.still {
+            add("still", [marched.bindings(), refined.bindings(), composed.bindings(), backdrop.bindings()].concat());
             add("still", rays.as_ref().map_or(Vec::new(), |rays| rays.bindings("rays")));
         }
-        if let Some(Animation { refined, fresh, before, now, composed, scene_before, .. }) = &self.animation {
-            add("animation", [fresh.bindings(), refined.bindings(), composed.bindings()].concat());
+        if let Some(Animation { refined, fresh, before, now, composed, backdrop, scene_before, .. }) = &self.animation {
+            add("animation", [fresh.bindings(), refined.bindings(), composed.bindings(), backdrop.bindings()].concat());
             add("animation", vec![("scene_before", scene_before.depth())]);
             add("animation", [before.bindings(), now.bindings()].concat());
         }
@@ -307,6 +315,7 @@ impl Renderer {
         })?;
 
         let lattice = refine::coarsest(&frame, quality) > 1;
+        let by_cells = method.by_cells(&frame, quality);
         let mut picture = Picture::default();
         for sheet in sheets([width, height], method) {
             frame.sheet_row = sheet.start;
@@ -316,7 +325,7 @@ impl Renderer {
             frame.sheet_rows = frame.rows + shared;
             let pixels = u64::from(width) * u64::from(frame.sheet_rows);
             if self.still.as_ref().is_none_or(|still| still.pixels < pixels || still.method != method) {
-                self.still = Some(Still::new(gpu, pixels, method));
+                self.still = Some(Still::new(gpu, [width, frame.sheet_rows], method));
             }
             let Some(still) = &self.still else { unreachable!("was just made") };
             if let Some(given) = &scene_depth {
@@ -338,34 +347,32 @@ impl Renderer {
                     march_sheet(&mut ctx, &scene, &mut frame, quality, pace, &still.refined, &still.marched)?;
                 }
             }
-            in_bands(&mut self.pixel_pace, gpu, &scene, &mut frame, [width, sheet.end], |frame| {
-                let mut work = gpu.work();
-                let marched = &still.marched;
-                composite::run(gpu, &mut work, &scene, frame, marched, &still.composed, all)?;
-                let first = u64::from(width) * u64::from(frame.first_row - frame.sheet_row);
-                let pixels = u64::from(width) * u64::from(frame.rows);
-                let layer = |work: &mut Work<'_>, buffer, bytes| work.download(buffer, bytes * first, bytes * pixels);
-                layer(&mut work, &still.composed.image, 16);
-                if all {
-                    layer(&mut work, &still.composed.sky, 16);
-                    layer(&mut work, &still.composed.depth, 4);
-                    layer(&mut work, &marched.samples, 4);
-                    if let Some(rays) = &still.rays {
-                        layer(&mut work, &rays.uncertainty, 16);
-                    }
+            let Still { marched, refined, composed, backdrop, rays, .. } = still;
+            let parts = Parts { marched, backdrop, refined, out: composed };
+            frame.rows = sheet.len() as u32;
+            let mut ctx = Context { gpu, uniforms: scene.uniforms, variant: scene.variant, timings, interrupt };
+            compose_sheet(&mut ctx, &scene, &mut frame, &mut self.pixel_pace, &parts, by_cells, all)?;
+            let mut work = gpu.work();
+            let pixels = u64::from(width) * sheet.len() as u64;
+            work.download(&composed.image, 0, 16 * pixels);
+            if all {
+                work.download(&composed.sky, 0, 16 * pixels);
+                work.download(&composed.depth, 0, 4 * pixels);
+                work.download(&marched.samples, 0, 4 * pixels);
+                if let Some(rays) = rays {
+                    work.download(&rays.uncertainty, 0, 16 * pixels);
                 }
-                let downloads = work.submit(timings, interrupt)?;
-                picture.image.extend_from_slice(downloads[0].numbers());
-                if all {
-                    picture.sky.extend_from_slice(downloads[1].numbers());
-                    picture.depth.extend_from_slice(downloads[2].numbers());
-                    picture.samples.extend_from_slice(downloads[3].numbers());
-                    if let Some(uncertainty) = downloads.get(4) {
-                        picture.uncertainty.extend_from_slice(uncertainty.numbers());
-                    }
+            }
+            let downloads = work.submit(timings, interrupt)?;
+            picture.image.extend_from_slice(downloads[0].numbers());
+            if all {
+                picture.sky.extend_from_slice(downloads[1].numbers());
+                picture.depth.extend_from_slice(downloads[2].numbers());
+                picture.samples.extend_from_slice(downloads[3].numbers());
+                if let Some(uncertainty) = downloads.get(4) {
+                    picture.uncertainty.extend_from_slice(uncertainty.numbers());
                 }
-                Ok(())
-            })?;
+            }
         }
         gpu.pipelines.store();
         Ok(picture)
@@ -492,7 +499,7 @@ impl Renderer {
         })?;
 
         let mut ctx = Context { gpu, uniforms: scene.uniforms, variant: scene.variant, timings, interrupt };
-        let Animation { refined, fresh, before, now, composed, scene_before, .. } = &*animation;
+        let Animation { refined, fresh, before, now, composed, backdrop, scene_before, .. } = &*animation;
         if let (Some((old, size)), Some(_)) = (&resized, &last) {
             [frame.previous_width, frame.previous_height] = *size;
             scene.uniforms.upload_frame(gpu, &frame);
@@ -529,19 +536,22 @@ impl Renderer {
             let mut ctx = Context { gpu, uniforms: scene.uniforms, variant: scene.variant, timings, interrupt };
             march_listed(&mut ctx, &scene, &mut frame, rays, &mut self.march_pace, refined, now)?;
         }
-        let mut image = Vec::with_capacity(screen.map_or(4 * pixels as usize, |_| 0));
-        in_bands(&mut self.pixel_pace, gpu, &scene, &mut frame, [width, height], |frame| {
-            let mut work = gpu.work();
-            composite::run(gpu, &mut work, &scene, frame, now, composed, false)?;
-            if let Some(screen) = screen {
-                display::run(gpu, &mut work, &scene, frame, composed, screen)?;
-                return work.submit(timings, interrupt).map(drop);
-            }
-            let (row, rows) = (u64::from(frame.first_row), u64::from(frame.rows));
-            work.download(&composed.image, 16 * u64::from(width) * row, 16 * u64::from(width) * rows);
-            image.extend_from_slice(work.submit(timings, interrupt)?[0].numbers());
-            Ok(())
-        })?;
+        frame.rows = height;
+        let parts = Parts { marched: now, backdrop, refined, out: composed };
+        let mut ctx = Context { gpu, uniforms: scene.uniforms, variant: scene.variant, timings, interrupt };
+        let by_cells = Method::March.by_cells(&frame, quality);
+        compose_sheet(&mut ctx, &scene, &mut frame, &mut self.pixel_pace, &parts, by_cells, false)?;
+        let mut work = gpu.work();
+        if let Some(screen) = screen {
+            frame.first_row = 0;
+            frame.rows = height;
+            scene.uniforms.upload_frame(gpu, &frame);
+            display::run(gpu, &mut work, &scene, &frame, composed, screen)?;
+        } else {
+            work.download(&composed.image, 0, 16 * pixels);
+        }
+        let downloads = work.submit(timings, interrupt)?;
+        let image = downloads.first().map_or(Vec::new(), |image| image.numbers().to_vec());
 
         gpu.pipelines.store();
         mem::swap(&mut animation.before, &mut animation.now);
@@ -902,7 +912,8 @@ impl World {
 }
 
 impl Still {
-    fn new(gpu: &Gpu, pixels: u64, method: Method) -> Self {
+    fn new(gpu: &Gpu, size: [u32; 2], method: Method) -> Self {
+        let pixels = size.map(u64::from).iter().product();
         let ray_bytes = match method {
             Method::March => None,
             Method::Reference => Some(reference::RAY_BYTES),
@@ -914,6 +925,7 @@ impl Still {
             refined: Refined::new(gpu, pixels),
             marched: Marched::new(gpu, pixels),
             composed: Composed::new(gpu, pixels),
+            backdrop: Backdrop::new(gpu, size),
             rays: ray_bytes.map(|bytes| Rays::new(gpu, pixels, bytes)),
         }
     }
@@ -930,6 +942,7 @@ impl Animation {
             before: Marched::new(gpu, pixels),
             now: Marched::new(gpu, pixels),
             composed: Composed::new(gpu, pixels),
+            backdrop: Backdrop::new(gpu, [width, height]),
             scene_before: SceneTextures::new(gpu, 0, false),
             last: None,
         }
@@ -1054,18 +1067,44 @@ fn march_listed(
     refined: &Refined,
     out: &Marched,
 ) -> Result<()> {
-    frame.first_ray = 0;
-    while frame.first_ray < rays {
-        frame.active_rays = pace.pixels().min(rays - frame.first_ray);
-        scene.uniforms.upload_frame(ctx.gpu, frame);
-        let started = Instant::now();
-        let mut work = ctx.gpu.work();
-        march::run_list(ctx.gpu, &mut work, scene, frame, refined, out)?;
-        work.submit(ctx.timings, ctx.interrupt)?;
-        pace.learn(u64::from(frame.active_rays), started);
-        frame.first_ray += frame.active_rays;
+    let (gpu, interrupt) = (ctx.gpu, ctx.interrupt);
+    in_list(pace, gpu, scene, frame, rays, |frame| {
+        let mut work = gpu.work();
+        march::run_list(gpu, &mut work, scene, frame, refined, out)?;
+        work.submit(ctx.timings, interrupt).map(drop)
+    })
+}
+
+/// Composes the sheet of `frame`: cells, then the pixels of those that are not smooth, or all of them.
+fn compose_sheet(
+    ctx: &mut Context<'_>,
+    scene: &Scene<'_>,
+    frame: &mut Frame,
+    pace: &mut Pace,
+    parts: &Parts<'_>,
+    by_cells: bool,
+    layers: bool,
+) -> Result<()> {
+    let (gpu, interrupt) = (ctx.gpu, ctx.interrupt);
+    if !by_cells {
+        let size = [frame.width, frame.sheet_row + frame.rows];
+        return in_bands(pace, gpu, scene, frame, size, |frame| {
+            let mut work = gpu.work();
+            composite::run(gpu, &mut work, scene, frame, parts, layers)?;
+            work.submit(ctx.timings, interrupt).map(drop)
+        });
     }
-    Ok(())
+    // All at once: the corners are few, and a cell costs little.
+    scene.uniforms.upload_frame(gpu, frame);
+    let mut work = gpu.work();
+    composite::run_cells(gpu, &mut work, scene, frame, parts, layers)?;
+    work.download(&parts.refined.count, 0, 4);
+    let cells: u32 = work.submit(ctx.timings, interrupt)?[0].numbers()[0];
+    in_list(pace, gpu, scene, frame, cells * TILE * TILE, |frame| {
+        let mut work = gpu.work();
+        composite::run_list(gpu, &mut work, scene, frame, parts, layers)?;
+        work.submit(ctx.timings, interrupt).map(drop)
+    })
 }
 
 /// How many pixels a second buys, from the bands so far.
@@ -1095,6 +1134,27 @@ impl Pace {
         let seen = pixels as f64 / started.elapsed().as_secs_f64().max(1e-6);
         self.pixels_per_second = seen.clamp(self.pixels_per_second / 4.0, self.pixels_per_second * 4.0);
     }
+}
+
+/// Runs `submit` for part after part of a list of so many pixels.
+fn in_list(
+    pace: &mut Pace,
+    gpu: &Gpu,
+    scene: &Scene<'_>,
+    frame: &mut Frame,
+    pixels: u32,
+    mut submit: impl FnMut(&Frame) -> Result<()>,
+) -> Result<()> {
+    frame.first_ray = 0;
+    while frame.first_ray < pixels {
+        frame.active_rays = pace.pixels().min(pixels - frame.first_ray);
+        scene.uniforms.upload_frame(gpu, frame);
+        let started = Instant::now();
+        submit(frame)?;
+        pace.learn(u64::from(frame.active_rays), started);
+        frame.first_ray += frame.active_rays;
+    }
+    Ok(())
 }
 
 /// Runs `submit` for band after band of a sheet, from the row where it begins to that where it ends.

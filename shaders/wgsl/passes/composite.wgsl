@@ -24,6 +24,17 @@ const LIMB = vec3f(0.397, 0.503, 0.652);
 // wrong too, and long enough that a level ray, which meets 50 times the layer, changes by 25 % a metre at the default.
 const HIGH_FADE = 100.0;
 
+// Pixels of a cell in each direction (as in composite.rs).
+const TILE = 4u;
+// Second difference of radiance and transmittance between corners of cells past which each pixel of a cell is worked out: as a
+// share of the contrast past which clouds are marched, of the brightest corner. What is smooth errs by an eighth of it.
+const CURVATURE = 0.1;
+// Most of the high clouds between corners, in tiles of their texture, and of shadows on the ground, in their texels.
+const FIBRE = 0.02;
+const SHADOW_EDGE = 2.0;
+// What stands for the distance of high clouds where a cell may hide an edge, m.
+const EDGE = 1e30;
+
 // Luminance of Rec. 709 red, green and blue.
 const LUMINANCE = vec3f(0.2126, 0.7152, 0.0722);
 
@@ -39,8 +50,12 @@ fn composite(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= frame.width || id.y >= frame.rows {
         return;
     }
-    let index = (frame.first_row + id.y - frame.sheet_row) * frame.width + id.x;
-    let pixel = vec2u(id.x, frame.first_row + id.y);
+    compose(vec2u(id.x, frame.first_row + id.y));
+}
+
+// A pixel of the picture.
+fn compose(pixel: vec2u) {
+    let index = (pixel.y - frame.sheet_row) * frame.width + pixel.x;
     let view = view_direction(vec2f(pixel) + 0.5);
     if view.w == 0.0 {
         image[index] = vec4f(0.0);
@@ -50,8 +65,215 @@ fn composite(@builtin(global_invocation_id) id: vec3u) {
         }
         return;
     }
-    let direction = view.xyz;
-    let scene = scene_distance(pixel);
+    var here = Layer(vec3f(0.0), 1.0, 0.0);
+    if !CLOUDLESS {
+        here = marched_layer(index);
+    }
+    put(index, sight_of(view.xyz, pixel, scene_distance(pixel), here));
+}
+
+// What has been marched, its distance as it is.
+fn marched_layer(index: u32) -> Layer {
+    let cloud = clouds[index];
+    return Layer(cloud.rgb, cloud.a, max(cloud_depth[index], 0.0));
+}
+
+fn put(index: u32, sight: Sight) {
+    if LAYERS {
+        sky[index] = vec4f(sight.background, 1.0);
+        let covered = 1.0 - sight.seen.transmittance;
+        depth[index] = select(-1.0, sight.seen.distance / covered, covered > 0.0);
+    }
+    let whole = vec4f(sight.seen.radiance + sight.seen.transmittance * sight.background, sight.opacity);
+    image[index] = select(vec4f(sight.seen.radiance, 1.0 - sight.seen.transmittance), whole, frame.background > 0u);
+}
+
+// What is behind the marched clouds is smooth nearly everywhere: it is worked out at the corners of cells, and between them
+// where it bends.
+
+fn cell_columns() -> u32 {
+    return (frame.width + TILE - 1u) / TILE;
+}
+
+// Cells have a corner more than there are in each direction, and their neighbours one on either side.
+fn corner_index(corner: vec2u) -> u32 {
+    return corner.y * (cell_columns() + 3u) + corner.x;
+}
+
+// What is behind the marched clouds, and the user's scene, at the corners of the cells of a sheet and of those around it.
+@compute @workgroup_size(8, 8)
+fn backdrop(@builtin(global_invocation_id) id: vec3u) {
+    if id.x >= cell_columns() + 3u || id.y >= (frame.rows + TILE - 1u) / TILE + 3u {
+        return;
+    }
+    let pixel = (vec2f(id.xy) - 1.0) * f32(TILE) + vec2f(0.0, f32(frame.sheet_row));
+    let view = view_direction(pixel + 0.5);
+    let sight = sight_of(view.xyz, vec2u(0u, frame.sheet_row), NO_SCENE, Layer(vec3f(0.0), 1.0, 0.0));
+    let ground = hit_sphere(view.xyz, frame.power_ground);
+    var distance = select(sight.seen.distance, -1.0 - sight.seen.distance, ground.enters);
+    if view.w == 0.0 || hides_edge(view.xyz, ground) {
+        distance = EDGE;
+    }
+    let high = vec4f(sight.seen.radiance, sight.seen.transmittance);
+    corners[corner_index(id.xy)] = mat2x4f(high, vec4f(sight.background, distance));
+}
+
+// Whether corners so far apart may miss an edge between them: the sun's disc, and, toward the horizon, high clouds and shadows.
+fn hides_edge(direction: vec3f, ground: Hit) -> bool {
+    let near_sun = SUN_RADIUS + f32(2u * TILE) * pixel_width();
+    var hides = one_minus_cos(direction, frame.sun_direction) < 0.5 * near_sun * near_sun;
+    if HIGH {
+        let far = hit_sphere(direction, frame.power_high).far;
+        let across = cell_across(direction, far, params.high_clouds.altitude);
+        hides = hides || (!ground.enters && across > FIBRE * params.high_clouds.scale);
+    }
+    if GROUND_SHADOW {
+        let q = ground.near * direction.xy + frame.shadow_eye;
+        var fine = SHADOW_EDGE * shadow_texel(shadow_level(q, 0.0));
+        if HIGH {
+            fine = min(fine, FIBRE * params.high_clouds.scale);
+        }
+        hides = hides || (ground.enters && cell_across(direction, ground.near, 0.0) > fine);
+    }
+    return hides;
+}
+
+// How far a cell reaches along a sphere that its ray meets at a distance, m.
+fn cell_across(direction: vec3f, distance: f32, altitude: f32) -> f32 {
+    let cosine = abs(cos_zenith_along(direction, distance, altitude));
+    return distance * f32(TILE) * pixel_width() / max(cosine, 1e-6);
+}
+
+// Puts the clouds of a cell before what lies behind them, or lists it.
+@compute @workgroup_size(8, 8)
+fn composite_cells(@builtin(global_invocation_id) id: vec3u) {
+    let columns = cell_columns();
+    if id.x >= columns || id.y >= (frame.rows + TILE - 1u) / TILE {
+        return;
+    }
+    let first = vec2u(id.x * TILE, frame.sheet_row + id.y * TILE);
+    var high: mat4x4f; // of the four corners
+    var behind: mat4x4f;
+    var bend = vec4f(0.0);
+    var brightest = 0.0;
+    var nearest = EDGE;
+    var farthest = -EDGE;
+    // It shows at the corners of the cells around too: high clouds near the horizon are lower than a cell.
+    var before: mat4x4f;
+    var earlier: mat4x4f;
+    var k = 0u;
+    loop {
+        var row: mat4x4f;
+        for (var j = 0u; j < 4u; j++) {
+            let both = corners[corner_index(id.xy + vec2u(j, k))];
+            let layer = both[0];
+            let sky = both[1];
+            row[j] = vec4f(layer.rgb + layer.a * sky.rgb, layer.a);
+            brightest = max(brightest, max(max(row[j].r, row[j].g), row[j].b));
+            if (j == 1u || j == 2u) && (k == 1u || k == 2u) {
+                let corner = 2u * (k - 1u) + j - 1u;
+                high[corner] = layer;
+                behind[corner] = sky;
+                nearest = min(nearest, sky.a);
+                farthest = max(farthest, sky.a);
+            }
+        }
+        bend = max(bend, max(abs(row[0] - 2.0 * row[1] + row[2]), abs(row[1] - 2.0 * row[2] + row[3])));
+        if k >= 2u {
+            for (var j = 0u; j < 4u; j++) {
+                bend = max(bend, abs(row[j] - 2.0 * before[j] + earlier[j]));
+            }
+        }
+        if k == 3u {
+            break;
+        }
+        earlier = before;
+        before = row;
+        k++;
+    }
+    // The horizon is an edge, however bright.
+    var smooth_cell = farthest < EDGE && (nearest < 0.0) == (farthest < 0.0)
+        && all(bend <= CURVATURE * quality.contrast * vec4f(vec3f(brightest), 1.0));
+    if SCENE {
+        smooth_cell = smooth_cell && nearest_scene(first) >= NO_SCENE;
+    }
+    // Nor does it matter what opaque clouds hide, but to who asks for the sky.
+    var hidden = !LAYERS && !CLOUDLESS && (!HIGH || (!VOLUME && frame.shell_top <= params.high_clouds.altitude));
+    var i = 0u;
+    loop {
+        let place = vec2u(i % TILE, i / TILE);
+        let pixel = first + place;
+        if all(pixel < vec2u(frame.width, frame.sheet_row + frame.rows)) {
+            let index = (pixel.y - frame.sheet_row) * frame.width + pixel.x;
+            let share = vec2f(place) / f32(TILE);
+            let rest = 1.0 - share;
+            let shares = vec4f(rest.x * rest.y, share.x * rest.y, rest.x * share.y, share.x * share.y);
+            let layer = high * shares;
+            let sky = behind * shares;
+            let far = Layer(layer.rgb, layer.a, select(sky.a, -1.0 - sky.a, sky.a < 0.0));
+            var seen = far;
+            if !CLOUDLESS {
+                let here = marched_layer(index);
+                hidden = hidden && here.transmittance == 0.0;
+                let depth = far.distance / max(1.0 - far.transmittance, 1e-6);
+                let near = Layer(here.radiance, here.transmittance, (1.0 - here.transmittance) * here.distance);
+                seen = over(near, far);
+                if HIGH {
+                    let under = over(far, near);
+                    let first = depth < here.distance;
+                    seen = Layer(
+                        select(seen.radiance, under.radiance, first),
+                        seen.transmittance,
+                        select(seen.distance, under.distance, first),
+                    );
+                }
+            }
+            put(index, Sight(seen, sky.rgb, 1.0));
+        }
+        if i == TILE * TILE - 1u {
+            break;
+        }
+        i++;
+    }
+    if !smooth_cell && !hidden {
+        active_rays[atomicAdd(&ray_count, 1u)] = id.y * columns + id.x;
+    }
+}
+
+// How near the user's scene comes in a cell.
+fn nearest_scene(first: vec2u) -> f32 {
+    let last = vec2u(frame.width, frame.sheet_row + frame.rows) - 1u;
+    var nearest = NO_SCENE;
+    for (var i = 0u; i < TILE * TILE; i++) {
+        nearest = min(nearest, scene_distance(min(first + vec2u(i % TILE, i / TILE), last)));
+    }
+    return nearest;
+}
+
+// The pixels of the cells of the list.
+@compute @workgroup_size(64)
+fn composite_list(@builtin(global_invocation_id) id: vec3u) {
+    if id.x >= frame.active_rays {
+        return;
+    }
+    let number = frame.first_ray + id.x;
+    let cell = active_rays[number / (TILE * TILE)];
+    let i = number % (TILE * TILE);
+    let pixel = TILE * vec2u(cell % cell_columns(), cell / cell_columns()) + vec2u(i % TILE, i / TILE);
+    if all(pixel < vec2u(frame.width, frame.rows)) {
+        compose(pixel + vec2u(0u, frame.sheet_row));
+    }
+}
+
+// What a pixel sees: all clouds, what is behind them, and how much of that is ours to say.
+struct Sight {
+    seen: Layer,
+    background: vec3f,
+    opacity: f32,
+}
+
+// What is seen in a direction, with the clouds that were marched there, to the user's scene at a pixel.
+fn sight_of(direction: vec3f, pixel: vec2u, scene: f32, here: Layer) -> Sight {
     let ground = hit_sphere(direction, frame.power_ground);
     var way = Way(0.0, 0.0, ground.enters);
     var texels = AirTexels(vec2f(0.0), vec2f(0.0));
@@ -64,11 +286,6 @@ fn composite(@builtin(global_invocation_id) id: vec3u) {
         air = whole_air(direction, way, texels, sky_behind);
     }
 
-    var here = Layer(vec3f(0.0), 1.0, 0.0);
-    if !CLOUDLESS {
-        let cloud = clouds[index];
-        here = Layer(cloud.rgb, cloud.a, max(cloud_depth[index], 0.0));
-    }
     // The march has seen them through the air.
     var seen = Layer(here.radiance, here.transmittance, (1.0 - here.transmittance) * here.distance);
     if HIGH {
@@ -116,17 +333,7 @@ fn composite(@builtin(global_invocation_id) id: vec3u) {
             opacity = 1.0 - seen.transmittance * dot(white - background, LUMINANCE);
         }
     }
-
-    if LAYERS {
-        sky[index] = vec4f(background, 1.0);
-        let covered = 1.0 - seen.transmittance;
-        depth[index] = select(-1.0, seen.distance / covered, covered > 0.0);
-    }
-    if frame.background > 0u {
-        image[index] = vec4f(seen.radiance + seen.transmittance * background, opacity);
-    } else {
-        image[index] = vec4f(seen.radiance, 1.0 - seen.transmittance);
-    }
+    return Sight(seen, background, opacity);
 }
 
 // The ground without the sun that clouds keep from it.

@@ -1,11 +1,24 @@
 //! The clouds before the sky: what the caller gets.
 
 use super::march::Marched;
+use super::refine::{Refined, WIDEST};
 use super::{Bindings, Scene};
 use crate::error::Result;
 use crate::frame::Frame;
 use crate::gpu::{Gpu, Work};
 use crate::kernel::Variant;
+use crate::params::Quality;
+
+/// Pixels of a cell in each direction (as in composite.wgsl).
+pub(crate) const TILE: u32 = 4;
+
+/// What a picture is composed of, and into.
+pub(crate) struct Parts<'a> {
+    pub marched: &'a Marched,
+    pub backdrop: &'a Backdrop,
+    pub refined: &'a Refined,
+    pub out: &'a Composed,
+}
 
 /// The picture, of a band or whole.
 pub(crate) struct Composed {
@@ -31,16 +44,84 @@ impl Composed {
     }
 }
 
+/// What is behind the marched clouds at the corners of the cells of a sheet, and of those around it.
+pub(crate) struct Backdrop {
+    pub corners: wgpu::Buffer,
+}
+
+impl Backdrop {
+    pub fn new(gpu: &Gpu, size: [u32; 2]) -> Self {
+        Self { corners: gpu.buffer("corners", 32 * corners(size).map(u64::from).iter().product::<u64>()) }
+    }
+
+    pub fn bindings(&self) -> Bindings<'_> {
+        vec![("corners", (&self.corners).into())]
+    }
+}
+
+fn corners(size: [u32; 2]) -> [u32; 2] {
+    size.map(|pixels| pixels.div_ceil(TILE) + 3)
+}
+
+/// The kernels where each pixel is worked out, and where cells are.
+pub(crate) const WHOLE: [(&str, &str); 1] = [("composite", "composite")];
+pub(crate) const CELLS: [(&str, &str); 3] =
+    [("composite", "backdrop"), ("composite", "composite_cells"), ("composite", "composite_list")];
+
+/// Whether what is behind the clouds is worked out by cells: where clouds are marched so, and cells as narrow as theirs. The
+/// high clouds are a single layer then, as they are from below.
+pub(crate) fn by_cells(frame: &Frame, quality: &Quality) -> bool {
+    let single = frame.high_clouds == 0 || frame.power_high <= 0.0;
+    quality.contrast > 0.0 && single && TILE as f32 * frame.marched_angle() / frame.stride as f32 <= WIDEST
+}
+
+/// Composes the cells of the sheet of `frame`, and lists those that are not smooth.
+pub(crate) fn run_cells(
+    gpu: &Gpu,
+    work: &mut Work<'_>,
+    scene: &Scene<'_>,
+    frame: &Frame,
+    parts: &Parts<'_>,
+    layers: bool,
+) -> Result<()> {
+    let Parts { marched, backdrop, refined, out } = parts;
+    let size = [frame.width, frame.rows];
+    let [columns, rows] = corners(size);
+    let bindings = [scene.bindings.as_slice(), &backdrop.bindings()].concat();
+    let kernel = gpu.kernel("composite", "backdrop", variant(scene.variant, frame, layers))?;
+    work.dispatch(&kernel, &bindings, [columns, rows, 1])?;
+    let bindings = [bindings, marched.bindings(), refined.bindings(), out.bindings()].concat();
+    let kernel = gpu.kernel("composite", "composite_cells", variant(scene.variant, frame, layers))?;
+    work.clear(&refined.count);
+    let [columns, rows] = size.map(|pixels| pixels.div_ceil(TILE));
+    work.dispatch(&kernel, &bindings, [columns, rows, 1])
+}
+
+/// Composes pixels of the listed cells: `frame.active_rays` of them from `frame.first_ray` on.
+pub(crate) fn run_list(
+    gpu: &Gpu,
+    work: &mut Work<'_>,
+    scene: &Scene<'_>,
+    frame: &Frame,
+    parts: &Parts<'_>,
+    layers: bool,
+) -> Result<()> {
+    let Parts { marched, refined, out, .. } = parts;
+    let bindings = [scene.bindings.as_slice(), &marched.bindings(), &refined.bindings(), &out.bindings()].concat();
+    let kernel = gpu.kernel("composite", "composite_list", variant(scene.variant, frame, layers))?;
+    work.dispatch(&kernel, &bindings, [frame.active_rays, 1, 1])
+}
+
 /// Composes the band of `frame`; `layers` fills `sky` and `depth` too, which takes lavapipe a seventh of the time.
 pub(crate) fn run(
     gpu: &Gpu,
     work: &mut Work<'_>,
     scene: &Scene<'_>,
     frame: &Frame,
-    marched: &Marched,
-    out: &Composed,
+    parts: &Parts<'_>,
     layers: bool,
 ) -> Result<()> {
+    let Parts { marched, out, .. } = parts;
     let bindings = [scene.bindings.as_slice(), &marched.bindings(), &out.bindings()].concat();
     let kernel = gpu.kernel("composite", "composite", variant(scene.variant, frame, layers))?;
     work.dispatch(&kernel, &bindings, [frame.width, frame.rows, 1])

@@ -491,10 +491,11 @@ class Quality(Block):
         How many steps one step outside cloud is long; on a hit the march goes back. Allowed: a
         whole number from 1 to 16.
     leap : float
-        How far a ray may leap through clear air, beyond `big_step`: as a share of `shape_scale` (or
-        `weather.scale`, if that is less) for each unit that the base shape lacks of being cloud. On
-        a hit the march goes back. 0 leaps no farther than `big_step`; none does where that is 1, in
-        grids, with rain in sight and with a second deck. Allowed: a number from 0 to 1.
+        How far a ray may leap through clear air, beyond `big_step`: as a share of
+        `clouds.shape_scale` (of `weather.scale` or two and a half pixels of `weather.map`, if that
+        is less) for each unit that the base shape lacks of being cloud. On a hit the march goes
+        back. 0 leaps no farther than `big_step`; none does where that is 1, in grids, with rain in
+        sight and with a second deck. Allowed: a number from 0 to 1.
     empty_samples : int
         Full samples of zero in a row after which samples are cheap again (nubis2015: 6). Allowed: a
         whole number from 1 to 4096.

@@ -345,8 +345,8 @@ params! {
         step_growth: f32 = 1.0, in 0..=1 "";
         /// How many steps one step outside cloud is long; on a hit the march goes back.
         big_step: u32 = 3, in 1..=16 "";
-        /// How far a ray may leap through clear air, beyond `big_step`: as a share of `shape_scale` (or `weather.scale`, if
-        /// that is less) for each unit that the base shape lacks of being cloud. On a hit the march goes back. 0 leaps no
+        /// How far a ray may leap through clear air, beyond `big_step`: as a share of `clouds.shape_scale` (of
+        /// `weather.scale` or two and a half pixels of `weather.map`, if that is less) for each unit that the base shape lacks of being cloud. On a hit the march goes back. 0 leaps no
         /// farther than `big_step`; none does where that is 1, in grids, with rain in sight and with a second deck.
         leap: f32 = 0.2, in 0..=1 "";
         /// Full samples of zero in a row after which samples are cheap again (nubis2015: 6).

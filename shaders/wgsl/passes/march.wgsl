@@ -153,10 +153,7 @@ struct Leaps {
 const PROFILE_SLOPE = 8.0;
 
 fn ray_leaps(direction: vec3f) -> Leaps {
-    var reach = quality.leap * min(params.clouds.shape_scale, params.weather.scale);
-    if KEEP_CLEAR {
-        reach = min(reach, 0.25 * frame.clear_radius);
-    }
+    let reach = quality.leap * frame.leap_scale;
     let thickness = params.clouds.top - params.clouds.base;
     return Leaps(reach, 1.0 + PROFILE_SLOPE * abs(dot(direction, frame.zenith)) * reach / thickness);
 }

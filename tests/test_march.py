@@ -194,7 +194,9 @@ def test_big_steps_find_the_same_clouds(renderer):
     """
     camera, params = nubis.scenes["fair_weather"]
     small, big = (
-        renderer(48, 27, twin.fine(192, big_step=b, leap=0.0, empty_samples=6)).render_layers(camera, params)
+        renderer(48, 27, twin.fine(192, big_step=b, leap=0.0, empty_samples=6)).render_layers(
+            camera, params
+        )
         for b in (1, 4)
     )
     assert (small["transmittance"] < 0.9).any()
@@ -259,7 +261,7 @@ def test_leaps_miss_no_small_cloud(renderer):
     """
     camera, params = nubis.scenes["fair_weather"]
     few = params.with_(**{"clouds.coverage": 0.365})
-    islands = np.zeros((64, 64, 3)) + [0.0, 0.5, 0.0]
+    islands = np.full((64, 64, 3), [0.0, 0.5, 0.0])
     islands[::8, ::8, 0] = 1.0
     sharp = params.with_(**{"weather.map": islands, "weather.extent": 20_000.0})
     for sky in few, sharp:

@@ -490,6 +490,12 @@ class Quality(Block):
     big_step : int
         How many steps one step outside cloud is long; on a hit the march goes back. Allowed: a
         whole number from 1 to 16.
+    leap : float
+        How far a ray may leap through clear air, beyond `big_step`: as a share of
+        `clouds.shape_scale` (of `weather.scale` or two and a half pixels of `weather.map`, if that
+        is less) for each unit that the base shape lacks of being cloud. On a hit the march goes
+        back. 0 leaps no farther than `big_step`; none does where that is 1, in grids, with rain in
+        sight and with a second deck. Allowed: a number from 0 to 1.
     empty_samples : int
         Full samples of zero in a row after which samples are cheap again (nubis2015: 6). Allowed: a
         whole number from 1 to 4096.
@@ -545,6 +551,7 @@ class Quality(Block):
     steps_horizon: int = 192
     step_growth: float = 1.0
     big_step: int = 3
+    leap: float = 0.2
     empty_samples: int = 6
     light_steps: int = 16
     light_share: float = 0.1

@@ -249,16 +249,28 @@ fn rain_below(weather: LocalWeather, at: vec2f, altitude: f32) -> Column {
 // The base shape, before detail: cheap, and never smaller than the density. `width` is the size of what one sample
 // stands for, in metres.
 fn cloud_shape(column: Column, width: f32) -> f32 {
+    return shape_in(column, base_noise(column, width));
+}
+
+// The noise that shapes the clouds at a point; in the user's grid its density.
+fn base_noise(column: Column, width: f32) -> f32 {
     if VOLUME {
-        return select(0.0, volume_density(column.at), column.limit > 0.0);
+        return volume_density(column.at);
     }
     let upper = UPPER && column.medium == UPPER_CLOUD;
     let lod = log2(max(scaled(width, upper) * 128.0 / params.clouds.shape_scale, 1.0));
     let origin = select(frame.shape_origin, frame.upper_shape_origin, upper);
-    let noise = textureSampleLevel(shape_noise, repeat_sampler, origin + column.at / params.clouds.shape_scale, lod);
-    var shape = with_coverage(base_shape(noise) * column.profile, column.coverage);
+    return base_shape(textureSampleLevel(shape_noise, repeat_sampler, origin + column.at / params.clouds.shape_scale, lod));
+}
+
+// The base shape where that noise is known.
+fn shape_in(column: Column, noise: f32) -> f32 {
+    if VOLUME {
+        return select(0.0, noise, column.limit > 0.0);
+    }
+    var shape = with_coverage(noise * column.profile, column.coverage);
     if RAIN_SHAFTS && column.medium == RAIN {
-        shape = column.limit * remap01(base_shape(noise), 0.15, 0.65);
+        shape = column.limit * remap01(noise, 0.15, 0.65);
     }
     return select(0.0, shape, column.limit > 0.0);
 }

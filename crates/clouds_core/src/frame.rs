@@ -123,6 +123,9 @@ params! {
         /// Highest.
         shell_top: f32 = 1.0;
 
+        /// The shortest of the scales by which the base shape varies: of what `quality.leap` is a share, m.
+        leap_scale: f32 = 1.0;
+
         /// Extinction where the density is 1: the largest of clouds, upper clouds and rain, 1/m.
         extinction: f32 = 0.0;
         /// That of the clouds as a share of it.
@@ -299,6 +302,20 @@ fn highest(params: &Params) -> f64 {
     DVec3::new(far.x, far.y, high.z + radius).length() - radius
 }
 
+/// The distance between features of the noise and of each weather; so short where the cover may go from nothing to all of it
+/// within a texel of the user's map, or half the radius of the spot to keep clear, that leaps by a fifth of it reach half a
+/// texel, a quarter of that radius. Measured, islands of a texel: a whole one loses half as many again as big steps do.
+fn leap_scale(params: &Params) -> f32 {
+    let of_weather = |(weather, _): (params::Weather, f32)| match &weather.map {
+        Some(map) => 2.5 * weather.extent / map.width.max(map.height) as f32,
+        None => weather.scale,
+    };
+    let clear = params.clear_spot().1 as f32;
+    let clear = if clear > 0.0 { 1.25 * clear } else { f32::INFINITY };
+    let scale = params.weather_shares().into_iter().map(of_weather).fold(params.clouds.shape_scale, f32::min);
+    scale.min(clear)
+}
+
 impl Frame {
     /// The frame of a picture of `size` pixels seen by `camera` at `time` seconds.
     pub fn new(camera: &Camera, params: &Params, time: f64, size: [u32; 2]) -> Self {
@@ -308,6 +325,7 @@ impl Frame {
         frame.set_planet(camera.eye, params);
         frame.set_wind(camera.eye, params, time);
         frame.set_volume(camera.eye, params);
+        frame.leap_scale = leap_scale(params);
         frame.sun_volume_rows = sun_volume::rows(params);
         frame.sun_volume_eye = sun_volume::eye_in(camera.eye, params, time);
         frame.shadow_texel = shadow::texel(frame.altitude);

@@ -345,6 +345,10 @@ params! {
         step_growth: f32 = 1.0, in 0..=1 "";
         /// How many steps one step outside cloud is long; on a hit the march goes back.
         big_step: u32 = 3, in 1..=16 "";
+        /// How far a ray may leap through clear air, beyond `big_step`: as a share of `clouds.shape_scale` (of
+        /// `weather.scale` or two and a half pixels of `weather.map`, if that is less) for each unit that the base shape lacks of being cloud. On a hit the march goes back. 0 leaps no
+        /// farther than `big_step`; none does where that is 1, in grids, with rain in sight and with a second deck.
+        leap: f32 = 0.2, in 0..=1 "";
         /// Full samples of zero in a row after which samples are cheap again (nubis2015: 6).
         empty_samples: u32 = 6, in 1..=4096 "";
         /// Light samples toward the sun, besides the far one.
@@ -664,6 +668,7 @@ impl Quality {
             steps_horizon: 128,
             step_growth: 0.0,
             big_step: 1,
+            leap: 0.0,
             light_steps: 5,
             light_share: 0.0,
             light_distance: 700.0,

@@ -95,7 +95,9 @@ impl App {
     /// A window on the clouds of a device, which it shares.
     pub fn new(context: &egui::Context, gpu: Arc<Gpu>, start: Start) -> Result<Self> {
         let repaint = context.clone();
-        let painter = Painter::new(gpu, start.adapter.clone(), move || repaint.request_repaint());
+        // Without a wait egui would paint twice.
+        let soon = Duration::from_millis(1);
+        let painter = Painter::new(gpu.clone(), start.adapter.clone(), move || repaint.request_repaint_after(soon));
         let scenes = preset::scenes()?;
         let name = start.scene.clone().unwrap_or_else(|| "fair_weather".into());
         let (flight, params) = match scenes.iter().find(|(scene, ..)| *scene == name) {
@@ -107,7 +109,7 @@ impl App {
             }
         };
         Ok(Self {
-            rate: start.rate.unwrap_or(20.0),
+            rate: start.rate.unwrap_or(if gpu.info.kind == "cpu" { 10.0 } else { 60.0 }),
             start,
             painter,
             scenes,

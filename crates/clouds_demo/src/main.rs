@@ -71,6 +71,8 @@ fn run(arguments: Arguments) -> Result<()> {
             .with_inner_size(arguments.size)
             .with_drag_and_drop(true),
         wgpu_options: WgpuConfiguration { wgpu_setup: setup, ..Default::default() },
+        // The picture has its own noise; a processor that draws the window has better to do.
+        dithering: false,
         ..Default::default()
     };
     let start = Start {

@@ -125,7 +125,7 @@ class Window:
         raise AssertionError("no picture was saved")
 
     def code(self) -> str:
-        self.click(241, 35)
+        self.click(388, 35)
         time.sleep(1)
         command = ["xclip", "-o", "-selection", "clipboard"]
         return subprocess.run(
@@ -199,6 +199,36 @@ def test_a_user_flies_paints_saves_and_goes_on_in_python(display, tmp_path, monk
         assert off(pixels(tmp_path / "sky.png"), pixels(picture)) < 0.02
     linear = nubis.Params.load(next(tmp_path.glob("*.toml")))
     assert linear.weather.map is not None
+
+
+@needs_display
+def test_panoramas_and_recordings(display, tmp_path):
+    with Window(display, tmp_path, "--scene", "cirrus") as demo:
+        window = demo.appear()
+        demo.save()
+        demo.click(300, 35)
+        demo.do("mousemove", 700, 400, "keydown", "w")
+        time.sleep(2)
+        demo.do("keyup", "w")
+        demo.click(300, 35)
+        frames = sorted(tmp_path.glob("frames*/frame*.png"))
+        assert len(frames) >= 2
+        assert all(pixels(frame).max() > 100 for frame in frames)
+        demo.click(226, 35)
+        started = time.monotonic()
+        while not list(tmp_path.glob("panorama*.png")):
+            assert time.monotonic() < started + PATIENCE
+            time.sleep(0.5)
+        time.sleep(1)
+        demo.leave(window)
+    panorama = np.asarray(_nubis.read_pixels(next(tmp_path.glob("panorama*.exr"))))
+    assert panorama.shape == (2048, 4096, 3) and np.isfinite(panorama).all()
+    camera, params = nubis.scenes["cirrus"]
+    small = nubis.Renderer(512, 256).render(nubis.Camera.equirect(camera.eye), params)[..., :3]
+    # The flight was some hundred metres; the sun's disc is a few pixels of the small one.
+    coarse = panorama.reshape(256, 8, 512, 8, 3).mean((1, 3))
+    dim = small[..., 0] < 2 * small[..., 0].mean()
+    assert off(coarse[dim], small[dim]) < 0.15
 
 
 @needs_display

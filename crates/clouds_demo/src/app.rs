@@ -77,6 +77,8 @@ pub struct App {
     /// What the last pictures cost, by pass.
     costs: VecDeque<(f64, Vec<(String, f64)>)>,
     captured: bool,
+    /// Where moving pictures are kept.
+    record: Option<PathBuf>,
     folder: PathBuf,
     /// What was done last, or went wrong.
     notice: String,
@@ -127,6 +129,7 @@ impl App {
             weather: WeatherPanel::default(),
             costs: VecDeque::new(),
             captured: false,
+            record: None,
             folder: std::env::current_dir().unwrap_or_default(),
             notice: String::new(),
             asked: None,
@@ -176,7 +179,7 @@ impl App {
     /// Takes a new picture, or a problem, from the painter.
     fn receive(&mut self, ui: &Ui, device: Option<&RenderState>) {
         match self.painter.problem() {
-            Some(problem @ Error::Parameter(_)) => self.notice = problem.to_string(),
+            Some(problem @ (Error::Parameter(_) | Error::File(_))) => self.notice = problem.to_string(),
             Some(problem) => {
                 // Nothing more can be painted, and the window is on the same device.
                 eprintln!("{problem}");
@@ -185,6 +188,9 @@ impl App {
                 ui.ctx().send_viewport_cmd(ViewportCommand::Close);
             }
             None => {}
+        }
+        if let Some(path) = self.painter.written() {
+            self.notice = format!("wrote {}", path.display());
         }
         let Some(shown) = self.painter.shown() else { return };
         if self.shown.as_ref().is_some_and(|old| old.count == shown.count) {
@@ -275,11 +281,31 @@ impl App {
                 let saved = preset::save(&path, &self.params).map(|()| path);
                 self.say_path(saved);
             }
+            let panorama = ui.button("Panorama").on_hover_text("the whole sphere, EXR and PNG; it may take a while");
+            if panorama.clicked() {
+                self.painter.ask_panorama(self.free_path("panorama", "exr"));
+                self.notice = "making a panorama".into();
+            }
+            let mut recording = self.record.is_some();
+            let record = ui.toggle_value(&mut recording, "Record");
+            if record.on_hover_text("keeps moving pictures as they come, PNG, in a new folder").changed() {
+                self.set_recording(recording);
+            }
             if ui.button("Copy as Python").clicked() {
                 let copied = self.python().map(|code| ui.ctx().copy_text(code));
                 self.say(copied, "copied".into());
             }
         });
+    }
+
+    fn set_recording(&mut self, on: bool) {
+        self.record = None;
+        if on {
+            let folder = self.free_path("frames", "d");
+            let made = std::fs::create_dir(&folder).with_context(|| format!("{} cannot be made", folder.display()));
+            self.record = made.is_ok().then(|| folder.clone());
+            self.say(made, format!("recording into {}", folder.display()));
+        }
     }
 
     fn say_path(&mut self, saved: Result<PathBuf>) {
@@ -518,6 +544,7 @@ impl App {
             tone_map: self.tone_map,
             wanted: Some(Duration::from_secs_f64(1.0 / self.rate)),
             sight: self.sight,
+            record: self.record.clone(),
         };
         self.painter.ask(wish.clone());
         self.asked = Some(wish);

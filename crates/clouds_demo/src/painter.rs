@@ -1,6 +1,7 @@
 //! Makes the pictures on a thread of its own, so that the window never waits for one.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::PathBuf;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
@@ -9,13 +10,15 @@ use clouds_core::gpu::Timings;
 use clouds_core::params::Weather;
 use clouds_core::renderer::Picture;
 use clouds_core::schema::Map;
-use clouds_core::{Camera, Error, Gpu, Params, Quality, Renderer, Result, Screen};
+use clouds_core::{Camera, Error, Gpu, Params, Quality, Renderer, Result, Screen, color, files};
 
 use crate::resolution::Resolution;
 use crate::sight::{Sight, pixels_of};
 
 /// How long everything has to stand still before it is rendered at its best.
 const REST: Duration = Duration::from_millis(300);
+/// Pixels of a panorama.
+const PANORAMA: [u32; 2] = [4096, 2048];
 
 /// What is to be seen.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,6 +43,8 @@ pub struct Wish {
     pub wanted: Option<Duration>,
     /// What of it is shown.
     pub sight: Sight,
+    /// Where moving pictures are kept, one file each.
+    pub record: Option<PathBuf>,
 }
 
 /// A picture that is ready.
@@ -65,12 +70,15 @@ pub struct Shown {
 struct Inbox {
     wish: Option<Arc<Wish>>,
     number: u64,
+    /// Where a panorama of what is wished for goes.
+    panorama: Option<PathBuf>,
     closed: bool,
 }
 
 #[derive(Default)]
 struct Outbox {
     shown: Option<Shown>,
+    written: Option<PathBuf>,
     problem: Option<Error>,
 }
 
@@ -126,6 +134,20 @@ impl Painter {
         inbox.number += 1;
         drop(inbox);
         self.shared.changed.notify_all();
+    }
+
+    /// Asks for a panorama of the sky that is wished for, in a file of linear radiance (EXR) and one to look at beside it (PNG).
+    pub fn ask_panorama(&self, path: PathBuf) {
+        let mut inbox = lock(&self.shared.inbox);
+        inbox.panorama = Some(path);
+        inbox.number += 1;
+        drop(inbox);
+        self.shared.changed.notify_all();
+    }
+
+    /// The panorama that was written since it was asked last.
+    pub fn written(&self) -> Option<PathBuf> {
+        lock(&self.shared.outbox).written.take()
     }
 
     /// The last picture.
@@ -187,6 +209,7 @@ impl<'a> Work<'a> {
         loop {
             let Some((wish, number)) = next(shared, done, None) else { return Ok(()) };
             done = number;
+            self.grant(shared, |work| work.panorama(shared, &wish))?;
             self.publish(shared, &wish, number, false)?;
             // Until something moves again.
             match next(shared, done, Some(REST)) {
@@ -197,18 +220,25 @@ impl<'a> Work<'a> {
         }
     }
 
-    /// Makes a picture and shows it. Where the wish cannot be granted, that is said.
-    fn publish(&mut self, shared: &Shared, wish: &Arc<Wish>, number: u64, at_rest: bool) -> Result<()> {
-        let started = Instant::now();
-        let made = match self.paint(shared, wish, number, at_rest) {
-            Err(Error::Interrupted) => return Ok(()),
-            Err(problem @ Error::Parameter(_)) => {
+    /// Does something; where a wish cannot be granted, that is said, and where it is no more, nothing.
+    fn grant<T>(&mut self, shared: &Shared, work: impl FnOnce(&mut Self) -> Result<T>) -> Result<Option<T>> {
+        match work(self) {
+            Ok(done) => Ok(Some(done)),
+            Err(Error::Interrupted) => Ok(None),
+            Err(problem @ (Error::Parameter(_) | Error::File(_))) => {
                 lock(&shared.outbox).problem = Some(problem);
                 (shared.notify)();
-                return Ok(());
+                Ok(None)
             }
-            made => made?,
-        };
+            Err(problem) => Err(problem),
+        }
+    }
+
+    /// Makes a picture and shows it.
+    fn publish(&mut self, shared: &Shared, wish: &Arc<Wish>, number: u64, at_rest: bool) -> Result<()> {
+        let started = Instant::now();
+        let made = self.grant(shared, |work| work.paint(shared, wish, number, at_rest))?;
+        let Some(made) = made else { return Ok(()) };
         let (screen, still, timings) = made;
         let took = started.elapsed();
         let map = self.map.as_ref().map(|(_, map)| map.clone());
@@ -257,8 +287,33 @@ impl<'a> Work<'a> {
             return Ok((screen, Some(Arc::new(picture)), timings));
         }
         self.moving.set(size[0], size[1], wish.moving_quality.clone())?;
-        self.moving.animate_onto(&screen, camera, params, *time, &interrupt)?;
+        if let Some(folder) = &wish.record {
+            let image = self.moving.animate(camera, params, *time, true, None, &interrupt)?;
+            screen.write(self.gpu, &image)?;
+            let path = folder.join(format!("frame{:05}.png", self.count));
+            let pixels = color::to_srgb8(&image, 4, wish.exposure, wish.tone_map)?;
+            files::write_png(&path, &pixels, size.map(|side| side as usize), 4)?;
+        } else {
+            self.moving.animate_onto(&screen, camera, params, *time, &interrupt)?;
+        }
         Ok((screen, None, self.moving.timings.clone()))
+    }
+
+    /// Makes the panorama that is asked for, if one is.
+    fn panorama(&mut self, shared: &Shared, wish: &Wish) -> Result<()> {
+        let Some(path) = lock(&shared.inbox).panorama.take() else { return Ok(()) };
+        let interrupt = || if lock(&shared.inbox).closed { Err(Error::Interrupted) } else { Ok(()) };
+        let [width, height] = PANORAMA;
+        self.still.set(width, height, wish.quality.clone())?;
+        let camera = Camera::equirect(wish.camera.eye)?;
+        let image = self.still.render(&camera, &wish.params, wish.time, true, false, None, &interrupt)?.image;
+        let size = PANORAMA.map(|side| side as usize);
+        files::write_exr(&path, &image, size, 4)?;
+        let pixels = color::to_srgb8(&image, 4, wish.exposure, wish.tone_map)?;
+        files::write_png(&path.with_extension("png"), &pixels, size, 4)?;
+        lock(&shared.outbox).written = Some(path);
+        (shared.notify)();
+        Ok(())
     }
 
     /// Fetches the weather map if it is another; while weathers go over into each other, it would be in every frame.

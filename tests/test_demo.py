@@ -116,7 +116,7 @@ class Window:
         before = set(self.folder.glob("sky*.png"))
         started = time.monotonic()
         while time.monotonic() < started + PATIENCE:
-            self.click(65, 35)
+            self.click(51, 35)
             new = set(self.folder.glob("sky*.png")) - before
             if new:
                 time.sleep(0.5)
@@ -125,7 +125,7 @@ class Window:
         raise AssertionError("no picture was saved")
 
     def code(self) -> str:
-        self.click(388, 35)
+        self.click(374, 35)
         time.sleep(1)
         command = ["xclip", "-o", "-selection", "clipboard"]
         return subprocess.run(
@@ -206,15 +206,15 @@ def test_panoramas_and_recordings(display, tmp_path):
     with Window(display, tmp_path, "--scene", "cirrus") as demo:
         window = demo.appear()
         demo.save()
-        demo.click(300, 35)
+        demo.click(285, 35)
         demo.do("mousemove", 700, 400, "keydown", "w")
         time.sleep(2)
         demo.do("keyup", "w")
-        demo.click(300, 35)
+        demo.click(285, 35)
         frames = sorted(tmp_path.glob("frames*/frame*.png"))
         assert len(frames) >= 2
         assert all(pixels(frame).max() > 100 for frame in frames)
-        demo.click(226, 35)
+        demo.click(212, 35)
         started = time.monotonic()
         while not list(tmp_path.glob("panorama*.png")):
             assert time.monotonic() < started + PATIENCE

@@ -11,6 +11,7 @@ use crate::cache::Pipelines;
 use crate::error::{Error, Result};
 use crate::kernel::{Binding, Kernel, Variant, Wanted};
 use crate::passes::noise::Noise;
+use crate::shader::{self, Linked};
 
 /// What an adapter says of itself.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -269,6 +270,16 @@ impl Gpu {
         Ok(kernel)
     }
 
+    /// Forgets what has been compiled, so that the shaders are read anew (`NUBIS_SHADERS`). Where one is broken all stays as it is,
+    /// and the error names its file and line.
+    pub fn reload_shaders(&self) -> Result<()> {
+        for name in shader::names() {
+            Linked::new(name).and_then(|linked| linked.parse().map(drop)).map_err(Error::File)?;
+        }
+        lock(&self.kernels).clear();
+        Ok(())
+    }
+
     /// Does `work` while `kernels` that it will ask for, each a pass and an entry, are compiled on other threads.
     pub(crate) fn compiling<T>(&self, kernels: &[Wanted], work: impl FnOnce() -> Result<T>) -> Result<T> {
         let compiled = |entry: &str, variant| {
@@ -290,9 +301,12 @@ impl Gpu {
 
     /// The first error since the last call, if any.
     pub(crate) fn check(&self) -> Result<()> {
+        let Some(mut error) = lock(&self.failure).error.take() else { return Ok(()) };
+        // What is asked of a lost device is refused before it says that it is lost.
+        let _ = self.device.poll(wgpu::PollType::Poll);
         let mut failure = lock(&self.failure);
-        let Some(error) = failure.error.take() else { return Ok(()) };
         if failure.lost {
+            error = failure.error.take().unwrap_or(error);
             failure.error = Some(error.clone());
             return Err(Error::Device(format!("{error}; make a new Renderer to go on")));
         }
@@ -461,7 +475,8 @@ impl Gpu {
                         )));
                     }
                 }
-                Err(error) => return Err(Error::Device(error.to_string())),
+                // A lost device says so first.
+                Err(error) => return self.check().and(Err(Error::Device(error.to_string()))),
             }
         }
     }

@@ -8,7 +8,8 @@ use std::time::{Duration, Instant};
 use anyhow::{Context as _, Result};
 use clouds_core::color::{TONE_MAPS, to_srgb8};
 use clouds_core::frame::Frame;
-use clouds_core::{Camera, Error, Gpu, Params, Quality, files};
+use clouds_core::params::Model;
+use clouds_core::{Camera, Error, Gpu, Params, Quality, Screen, files};
 use eframe::egui::{self, Key, PointerButton, Sense, Ui, ViewportCommand};
 use eframe::egui_wgpu::RenderState;
 use eframe::wgpu::FilterMode;
@@ -21,6 +22,7 @@ use crate::panel::Panel;
 use crate::preset::{self, Shot};
 use crate::sight::Sight;
 use crate::sun::Clock;
+use crate::watch::{self, Watch};
 use crate::weather::WeatherPanel;
 
 /// Degrees that a dragged or captured pointer turns the view for each point.
@@ -77,6 +79,9 @@ pub struct App {
     /// What the last pictures cost, by pass.
     costs: VecDeque<(f64, Vec<(String, f64)>)>,
     captured: bool,
+    beside: Beside,
+    /// Where the bar between the two is, as a share of the view.
+    bar: f32,
     /// Where moving pictures are kept.
     record: Option<PathBuf>,
     folder: PathBuf,
@@ -86,6 +91,8 @@ pub struct App {
     asked: Option<Wish>,
     shown: Option<Shown>,
     texture: Option<egui::TextureId>,
+    texture_beside: Option<egui::TextureId>,
+    watch: Option<Watch>,
     last_step: Instant,
     last_picture: Instant,
     /// From one picture to the next.
@@ -129,12 +136,16 @@ impl App {
             weather: WeatherPanel::default(),
             costs: VecDeque::new(),
             captured: false,
+            beside: Beside::Nothing,
+            bar: 0.5,
             record: None,
             folder: std::env::current_dir().unwrap_or_default(),
             notice: String::new(),
             asked: None,
             shown: None,
             texture: None,
+            texture_beside: None,
+            watch: Watch::new(std::env::var_os("NUBIS_SHADERS")),
             last_step: Instant::now(),
             last_picture: Instant::now(),
             intervals: Vec::new(),
@@ -165,6 +176,7 @@ impl App {
     /// One frame of the window.
     pub fn frame(&mut self, ui: &mut Ui, device: Option<&RenderState>) {
         Self::leave_when_asked(ui);
+        self.look_at_shaders(ui);
         self.receive(ui, device);
         self.read_dropped_files(ui);
         egui::Panel::top("top").show(ui, |ui| self.menu(ui));
@@ -179,7 +191,10 @@ impl App {
     /// Takes a new picture, or a problem, from the painter.
     fn receive(&mut self, ui: &Ui, device: Option<&RenderState>) {
         match self.painter.problem() {
-            Some(problem @ (Error::Parameter(_) | Error::File(_))) => self.notice = problem.to_string(),
+            // Errors of shaders are drawn with lines that the font lacks.
+            Some(problem @ (Error::Parameter(_) | Error::File(_))) => {
+                self.notice = problem.to_string().replace(['┌', '─', '│'], " ");
+            }
             Some(problem) => {
                 // Nothing more can be painted, and the window is on the same device.
                 eprintln!("{problem}");
@@ -197,15 +212,9 @@ impl App {
             return;
         }
         if let Some(device) = device {
-            let mut renderer = device.renderer.write();
-            let view = shown.screen.view();
-            match self.texture {
-                Some(id) => {
-                    renderer.update_egui_texture_from_wgpu_texture(&device.device, view, FilterMode::Linear, id);
-                }
-                None => {
-                    self.texture = Some(renderer.register_native_texture(&device.device, view, FilterMode::Linear));
-                }
+            show_screen(device, &shown.screen, &mut self.texture);
+            if let Some(beside) = &shown.beside {
+                show_screen(device, beside, &mut self.texture_beside);
             }
         }
         self.costs.push_back((shown.count as f64, shown.timings.0.clone()));
@@ -221,6 +230,15 @@ impl App {
         if ui.input_mut(|input| input.consume_key(egui::Modifiers::COMMAND, Key::Q)) {
             ui.ctx().send_viewport_cmd(ViewportCommand::Close);
         }
+    }
+
+    fn look_at_shaders(&mut self, ui: &Ui) {
+        let Some(watch) = &mut self.watch else { return };
+        if watch.has_changed() {
+            self.notice = "reading the shaders".into();
+            self.painter.reload();
+        }
+        ui.ctx().request_repaint_after(watch::EVERY);
     }
 
     fn read_dropped_files(&mut self, ui: &Ui) {
@@ -264,14 +282,18 @@ impl App {
                     ui.selectable_value(&mut self.sight, sight, sight.name());
                 }
             });
+            egui::ComboBox::from_label("beside").selected_text(self.beside.name()).show_ui(ui, |ui| {
+                for beside in Beside::all() {
+                    ui.selectable_value(&mut self.beside, beside, beside.name());
+                }
+            });
             egui::ComboBox::from_label("tone map").selected_text(self.tone_map).show_ui(ui, |ui| {
                 for name in TONE_MAPS {
                     ui.selectable_value(&mut self.tone_map, name, name);
                 }
             });
-            ui.add(egui::Slider::new(&mut self.exposure, -8.0..=16.0).suffix(" stops").text("exposure"));
-            ui.add(egui::Slider::new(&mut self.rate, 2.0..=120.0).logarithmic(true).suffix(" Hz").text("wanted"));
-            ui.separator();
+        });
+        ui.horizontal_wrapped(|ui| {
             if ui.button("Save picture").on_hover_text("PNG and EXR, in the current folder").clicked() {
                 let saved = self.save_picture();
                 self.say_path(saved);
@@ -295,6 +317,9 @@ impl App {
                 let copied = self.python().map(|code| ui.ctx().copy_text(code));
                 self.say(copied, "copied".into());
             }
+            ui.separator();
+            ui.add(egui::Slider::new(&mut self.exposure, -8.0..=16.0).suffix(" stops").text("exposure"));
+            ui.add(egui::Slider::new(&mut self.rate, 2.0..=120.0).logarithmic(true).suffix(" Hz").text("wanted"));
         });
     }
 
@@ -444,9 +469,25 @@ impl App {
 
     fn view(&mut self, ui: &mut Ui) -> egui::Response {
         let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::click_and_drag());
+        let part = |left: f32, right: f32| {
+            let uv = egui::Rect::from_min_max(egui::pos2(left, 0.0), egui::pos2(right, 1.0));
+            let across = |share| rect.left() + share * rect.width();
+            (egui::Rect::from_x_y_ranges(across(left)..=across(right), rect.y_range()), uv)
+        };
+        let beside = self.shown.as_ref().is_some_and(|shown| shown.beside.is_some());
+        let bar = if beside { self.bar } else { 1.0 };
         if let Some(texture) = self.texture {
-            let all = egui::Rect::from_min_max(egui::pos2(0.0, 0.0), egui::pos2(1.0, 1.0));
-            ui.painter().image(texture, rect, all, egui::Color32::WHITE);
+            let (place, uv) = part(0.0, bar);
+            ui.painter().image(texture, place, uv, egui::Color32::WHITE);
+        }
+        if let (true, Some(texture)) = (beside, self.texture_beside) {
+            let (place, uv) = part(bar, 1.0);
+            ui.painter().image(texture, place, uv, egui::Color32::WHITE);
+            let line = egui::Rect::from_x_y_ranges(place.left() - 1.0..=place.left() + 1.0, rect.y_range());
+            ui.painter().rect_filled(line, 0.0, egui::Color32::WHITE);
+            let handle = ui.interact(line.expand(5.0), ui.scope_id().with("bar"), Sense::drag());
+            self.bar = (self.bar + handle.drag_delta().x / rect.width()).clamp(0.02, 0.98);
+            handle.on_hover_and_drag_cursor(egui::CursorIcon::ResizeHorizontal);
         }
         response.on_hover_cursor(egui::CursorIcon::Crosshair)
     }
@@ -544,6 +585,7 @@ impl App {
             tone_map: self.tone_map,
             wanted: Some(Duration::from_secs_f64(1.0 / self.rate)),
             sight: self.sight,
+            beside: self.beside.apply(&self.params, &self.quality),
             record: self.record.clone(),
         };
         self.painter.ask(wish.clone());
@@ -588,6 +630,54 @@ impl App {
     /// Puts the visitor elsewhere.
     pub fn go_to(&mut self, eye: DVec3) {
         self.flight.eye = eye;
+    }
+}
+
+/// Gives the window a screen to sample, in place of the one before.
+fn show_screen(device: &RenderState, screen: &Screen, texture: &mut Option<egui::TextureId>) {
+    let mut renderer = device.renderer.write();
+    let view = screen.view();
+    match *texture {
+        Some(id) => renderer.update_egui_texture_from_wgpu_texture(&device.device, view, FilterMode::Linear, id),
+        None => *texture = Some(renderer.register_native_texture(&device.device, view, FilterMode::Linear)),
+    }
+}
+
+/// What is shown beside the picture at rest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Beside {
+    Nothing,
+    Quality(&'static str),
+    Light(Model),
+}
+
+impl Beside {
+    /// All that can be chosen.
+    fn all() -> impl Iterator<Item = Self> {
+        let models = [Model::Single, Model::Nubis2015, Model::Thesis2018, Model::Vsu2022, Model::Octaves, Model::Path];
+        let qualities = Quality::NAMES.into_iter().map(Self::Quality);
+        [Self::Nothing].into_iter().chain(qualities).chain(models.map(Self::Light))
+    }
+
+    fn name(self) -> String {
+        match self {
+            Self::Nothing => "nothing".into(),
+            Self::Quality(name) => name.into(),
+            Self::Light(model) => format!("light {model:?}").to_lowercase(),
+        }
+    }
+
+    /// The sky and the method, of those of the picture.
+    fn apply(self, params: &Params, quality: &Quality) -> Option<(Params, Quality)> {
+        match self {
+            Self::Nothing => None,
+            Self::Quality(name) => Some((params.clone(), Quality::named(name).ok()?)),
+            Self::Light(model) => {
+                let mut params = params.clone();
+                params.light.model = model;
+                Some((params, quality.clone()))
+            }
+        }
     }
 }
 

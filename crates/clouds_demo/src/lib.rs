@@ -10,4 +10,5 @@ pub mod preset;
 pub mod resolution;
 pub mod sight;
 pub mod sun;
+pub mod watch;
 pub mod weather;

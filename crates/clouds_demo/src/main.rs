@@ -52,6 +52,11 @@ fn rate(text: &str) -> Result<f64> {
 }
 
 fn main() -> ExitCode {
+    #[cfg(debug_assertions)]
+    if std::env::var_os("NUBIS_SHADERS").is_none() {
+        // SAFETY: there is no other thread yet. Builds for work on the shaders read them from where they are.
+        unsafe { std::env::set_var("NUBIS_SHADERS", concat!(env!("CARGO_MANIFEST_DIR"), "/../../shaders/wgsl")) };
+    }
     match run(Arguments::parse()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

@@ -1,5 +1,6 @@
 //! Makes the pictures on a thread of its own, so that the window never waits for one.
 
+use std::mem;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -13,10 +14,12 @@ use clouds_core::schema::Map;
 use clouds_core::{Camera, Error, Gpu, Params, Quality, Renderer, Result, Screen, color, files};
 
 use crate::resolution::Resolution;
-use crate::sight::{Sight, pixels_of};
+use crate::sight::{Sight, error_pixels, pixels_of};
 
 /// How long everything has to stand still before it is rendered at its best.
 const REST: Duration = Duration::from_millis(300);
+/// How many times the pixels of the view are as wide where they are compared with `reference`.
+const TRUTH_SHARE: u32 = 4;
 /// Pixels of a panorama.
 const PANORAMA: [u32; 2] = [4096, 2048];
 
@@ -43,6 +46,8 @@ pub struct Wish {
     pub wanted: Option<Duration>,
     /// What of it is shown.
     pub sight: Sight,
+    /// Another sky or method that is shown beside it at rest.
+    pub beside: Option<(Params, Quality)>,
     /// Where moving pictures are kept, one file each.
     pub record: Option<PathBuf>,
 }
@@ -52,6 +57,8 @@ pub struct Wish {
 pub struct Shown {
     /// Where it is.
     pub screen: Arc<Screen>,
+    /// Where what is beside it is.
+    pub beside: Option<Arc<Screen>>,
     /// What it is of.
     pub wish: Arc<Wish>,
     /// The whole of a still.
@@ -72,6 +79,8 @@ struct Inbox {
     number: u64,
     /// Where a panorama of what is wished for goes.
     panorama: Option<PathBuf>,
+    /// Whether the shaders have changed.
+    reload: bool,
     closed: bool,
 }
 
@@ -145,6 +154,15 @@ impl Painter {
         self.shared.changed.notify_all();
     }
 
+    /// Says that the shaders have changed.
+    pub fn reload(&self) {
+        let mut inbox = lock(&self.shared.inbox);
+        inbox.reload = true;
+        inbox.number += 1;
+        drop(inbox);
+        self.shared.changed.notify_all();
+    }
+
     /// The panorama that was written since it was asked last.
     pub fn written(&self) -> Option<PathBuf> {
         lock(&self.shared.outbox).written.take()
@@ -169,6 +187,14 @@ impl Drop for Painter {
             let _ = thread.join();
         }
     }
+}
+
+/// What came of a wish.
+struct Made {
+    screen: Arc<Screen>,
+    beside: Option<Arc<Screen>>,
+    still: Option<Arc<Picture>>,
+    timings: Timings,
 }
 
 /// What the thread has.
@@ -209,6 +235,9 @@ impl<'a> Work<'a> {
         loop {
             let Some((wish, number)) = next(shared, done, None) else { return Ok(()) };
             done = number;
+            if mem::take(&mut lock(&shared.inbox).reload) {
+                self.grant(shared, |work| work.gpu.reload_shaders())?;
+            }
             self.grant(shared, |work| work.panorama(shared, &wish))?;
             self.publish(shared, &wish, number, false)?;
             // Until something moves again.
@@ -239,7 +268,7 @@ impl<'a> Work<'a> {
         let started = Instant::now();
         let made = self.grant(shared, |work| work.paint(shared, wish, number, at_rest))?;
         let Some(made) = made else { return Ok(()) };
-        let (screen, still, timings) = made;
+        let Made { screen, beside, still, timings } = made;
         let took = started.elapsed();
         let map = self.map.as_ref().map(|(_, map)| map.clone());
         // The window takes its time too, where one processor draws all.
@@ -250,42 +279,28 @@ impl<'a> Work<'a> {
             self.moved = Some(Instant::now());
         }
         self.count += 1;
-        let shown = Shown { screen, wish: wish.clone(), still, took, timings, map, count: self.count };
+        let shown = Shown { screen, beside, wish: wish.clone(), still, took, timings, map, count: self.count };
         lock(&shared.outbox).shown = Some(shown);
         (shared.notify)();
         Ok(())
     }
 
-    fn paint(
-        &mut self,
-        shared: &Shared,
-        wish: &Wish,
-        number: u64,
-        at_rest: bool,
-    ) -> Result<(Arc<Screen>, Option<Arc<Picture>>, Timings)> {
+    fn paint(&mut self, shared: &Shared, wish: &Wish, number: u64, at_rest: bool) -> Result<Made> {
         let Wish { camera, params, time, .. } = wish;
         let interrupt = || {
             let inbox = lock(&shared.inbox);
             let stale = inbox.closed || (at_rest && inbox.number != number);
             if stale { Err(Error::Interrupted) } else { Ok(()) }
         };
-        let size = if at_rest || wish.wanted.is_none() { wish.window } else { self.resolution.of(wish.window) };
-        let screen = self.screen(wish, size)?;
-        if at_rest || wish.sight != Sight::Picture {
-            let quality = if at_rest { &wish.quality } else { &wish.moving_quality };
-            self.still.set(size[0], size[1], quality.clone())?;
-            let layers = wish.sight != Sight::Picture;
-            let picture = self.still.render(camera, params, *time, !layers, layers, None, &interrupt)?;
-            match wish.sight {
-                Sight::Picture => screen.write(self.gpu, &picture.image)?,
-                sight => screen.write_pixels(self.gpu, &pixels_of(sight, &picture))?,
-            }
-            let timings = self.still.timings.clone();
-            if at_rest {
-                self.look_at_weather(params, &interrupt)?;
-            }
-            return Ok((screen, Some(Arc::new(picture)), timings));
+        if at_rest {
+            self.look_at_weather(params, &interrupt)?;
+            return self.paint_still(wish, wish.window, &wish.quality, &interrupt);
         }
+        let size = wish.wanted.map_or(wish.window, |_| self.resolution.of(wish.window));
+        if wish.sight != Sight::Picture {
+            return self.paint_still(wish, size, &wish.moving_quality, &interrupt);
+        }
+        let screen = self.screen(wish, size)?;
         self.moving.set(size[0], size[1], wish.moving_quality.clone())?;
         if let Some(folder) = &wish.record {
             let image = self.moving.animate(camera, params, *time, true, None, &interrupt)?;
@@ -296,7 +311,45 @@ impl<'a> Work<'a> {
         } else {
             self.moving.animate_onto(&screen, camera, params, *time, &interrupt)?;
         }
-        Ok((screen, None, self.moving.timings.clone()))
+        Ok(Made { screen, beside: None, still: None, timings: self.moving.timings.clone() })
+    }
+
+    /// A still by a method, what it is made of, or how far it is from the truth; and what is wished beside it.
+    fn paint_still(
+        &mut self,
+        wish: &Wish,
+        size: [u32; 2],
+        quality: &Quality,
+        interrupt: &dyn Fn() -> Result<()>,
+    ) -> Result<Made> {
+        let Wish { camera, time, .. } = wish;
+        let mut still = |size: [u32; 2], params: &Params, quality: &Quality, layers: bool| {
+            self.still.set(size[0], size[1], quality.clone())?;
+            self.still.render(camera, params, *time, !layers, layers, None, interrupt)
+        };
+        // The truth takes its time.
+        let size = if wish.sight == Sight::Error { size.map(|side| (side / TRUTH_SHARE).max(1)) } else { size };
+        let picture = still(size, &wish.params, quality, wish.sight.is_of_layers())?;
+        let truth = match wish.sight {
+            Sight::Error => Some(still(size, &wish.params, &Quality::named("reference")?, false)?),
+            _ => None,
+        };
+        let other = match &wish.beside {
+            Some((params, quality)) if wish.sight == Sight::Picture => Some(still(size, params, quality, false)?),
+            _ => None,
+        };
+        let timings = self.still.timings.clone();
+        let screen = self.screen(wish, size)?;
+        match (wish.sight, truth) {
+            (Sight::Picture, _) => screen.write(self.gpu, &picture.image)?,
+            (_, Some(truth)) => screen.write_pixels(self.gpu, &error_pixels(&picture, &truth))?,
+            (sight, None) => screen.write_pixels(self.gpu, &pixels_of(sight, &picture))?,
+        }
+        let show = |other: Picture| {
+            let screen = Screen::new(self.gpu, size, wish.exposure, wish.tone_map)?;
+            screen.write(self.gpu, &other.image).map(|()| Arc::new(screen))
+        };
+        Ok(Made { screen, beside: other.map(show).transpose()?, still: Some(Arc::new(picture)), timings })
     }
 
     /// Makes the panorama that is asked for, if one is.

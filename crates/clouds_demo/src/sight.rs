@@ -4,6 +4,8 @@ use clouds_core::renderer::Picture;
 
 /// Evaluations that are white, as in thesis2018's figure 39.
 pub const WHITE: f32 = 500.0;
+/// Relative error of luminance that is white.
+pub const WHITE_ERROR: f32 = 0.2;
 /// The distance at which half of the light is left in the picture of depth, m.
 const HALF: f32 = 5000.0;
 
@@ -19,11 +21,13 @@ pub enum Sight {
     Depth,
     /// What each pixel costs.
     Heat,
+    /// How far the picture is from `reference`, at rest, in larger pixels.
+    Error,
 }
 
 impl Sight {
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::Picture, Self::Transmittance, Self::Depth, Self::Heat];
+    pub const ALL: [Self; 5] = [Self::Picture, Self::Transmittance, Self::Depth, Self::Heat, Self::Error];
 
     /// Its name.
     pub fn name(self) -> &'static str {
@@ -32,7 +36,13 @@ impl Sight {
             Self::Transmittance => "transmittance",
             Self::Depth => "depth",
             Self::Heat => "density evaluations",
+            Self::Error => "error",
         }
+    }
+
+    /// Whether it is made of the layers of a picture.
+    pub fn is_of_layers(self) -> bool {
+        !matches!(self, Self::Picture | Self::Error)
     }
 }
 
@@ -40,24 +50,48 @@ impl Sight {
 pub fn pixels_of(sight: Sight, picture: &Picture) -> Vec<u8> {
     let grey = |v: f32| [v, v, v];
     let color = |i: usize| match sight {
-        Sight::Picture | Sight::Transmittance => grey(1.0 - picture.image[4 * i + 3]),
+        Sight::Picture | Sight::Error | Sight::Transmittance => grey(1.0 - picture.image[4 * i + 3]),
         Sight::Depth if picture.depth[i] < 0.0 => grey(0.0),
         Sight::Depth => grey(1.0 / (1.0 + picture.depth[i] / HALF)),
-        // Black, red, yellow, white.
-        Sight::Heat => [0.0, 1.0, 2.0].map(|shift| 3.0 * picture.samples[i] as f32 / WHITE - shift),
+        Sight::Heat => heat(picture.samples[i] as f32 / WHITE),
     };
-    let byte = |v: f32| (255.0 * v.clamp(0.0, 1.0)).round() as u8;
-    (0..picture.samples.len())
-        .flat_map(|i| {
-            let [r, g, b] = color(i).map(byte);
-            [r, g, b, 255]
+    (0..picture.samples.len()).flat_map(|i| opaque(color(i))).collect()
+}
+
+/// The pixels of the relative error of one picture against another of luminance, from black to white at [`WHITE_ERROR`].
+pub fn error_pixels(picture: &Picture, truth: &Picture) -> Vec<u8> {
+    let luminance = |pixel: &[f32]| 0.2126 * pixel[0] + 0.7152 * pixel[1] + 0.0722 * pixel[2];
+    let pairs = picture.image.chunks_exact(4).zip(truth.image.chunks_exact(4));
+    pairs
+        .flat_map(|(a, b)| {
+            let (a, b) = (luminance(a), luminance(b));
+            opaque(heat((a - b).abs() / b.max(1e-12) / WHITE_ERROR))
         })
         .collect()
+}
+
+/// Black, red, yellow, white from 0 to 1.
+fn heat(share: f32) -> [f32; 3] {
+    [0.0, 1.0, 2.0].map(|shift| 3.0 * share - shift)
+}
+
+fn opaque(color: [f32; 3]) -> [u8; 4] {
+    let [r, g, b] = color.map(|v| (255.0 * v.clamp(0.0, 1.0)).round() as u8);
+    [r, g, b, 255]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn errors_are_relative() {
+        let [a, b] = [1.1, 1.0].map(|v| Picture { image: vec![v, v, v, 1.0], ..Picture::default() });
+        assert_eq!(error_pixels(&a, &a), [0, 0, 0, 255]);
+        // A tenth of two tenths: between red and yellow.
+        let [red, green, blue, _] = error_pixels(&a, &b)[..] else { panic!("one pixel") };
+        assert!(red == 255 && (127..=129).contains(&green) && blue == 0, "{red} {green} {blue}");
+    }
 
     #[test]
     fn layers_become_colours() {

@@ -101,9 +101,10 @@ $(VENV)/bench: pyproject.toml $(VENV)/ready
 	PIP_QUIET=1 $(BIN)/maturin develop --release --extras bench
 	@touch $@
 
-bench: build $(VENV)/bench ## Measure error against time into benchmarks/results, docs/accuracy.md (25 min on two cores)
+bench: build window $(VENV)/bench ## Measure error against time into benchmarks/results, docs/accuracy.md (25 min on two cores)
 	$(BIN)/python -m benchmarks
 	$(BIN)/python -m benchmarks.speed
+	$(BIN)/python -m benchmarks.demo
 
 bench-kernels: setup ## Time a small frame and each of its kernels (NUBIS_ADAPTER chooses the adapter)
 	cargo bench --bench frame

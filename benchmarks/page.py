@@ -19,6 +19,7 @@ from benchmarks.shapes import fit
 
 PAGE = Path(__file__).parents[1] / "docs" / "accuracy.md"
 SPEED = PAGE.with_name("speed.md")
+DEMO = PAGE.with_name("demo.md")
 
 
 def write(folder: Path, page: Path = PAGE) -> None:
@@ -60,6 +61,36 @@ def write_speed(folder: Path, page: Path = SPEED) -> None:
     if (heat := _read(folder, "heat.json")) is not None:
         blocks["heat"] = _heat(heat) + "\n\n" + _image(folder, page, "heat")
     page.write_text(_filled(page.read_text(), blocks))
+
+
+def write_demo(folder: Path, page: Path = DEMO) -> None:
+    """The same for docs/demo.md."""
+    if (found := _read(folder, "demo.json")) is not None:
+        block = _about(found["header"]) + "\n\n" + _flights(found["rows"])
+        page.write_text(_filled(page.read_text(), {"flights": block}))
+
+
+def _flights(rows: list[Row]) -> str:
+    heads = (
+        "scene",
+        "frames/s wanted",
+        "median ms",
+        "slowest twentieth",
+        "worst",
+        "pixels at the end",
+    )
+    return _table(
+        heads,
+        [
+            [
+                f"`{row['scene']}`",
+                str(row["rate"]),
+                *(str(row[key]) for key in ("median", "slow", "worst")),
+                "×".join(str(side) for side in row["size"]),
+            ]
+            for row in rows
+        ],
+    )
 
 
 def _against(found: Row) -> str:

@@ -1,0 +1,76 @@
+"""How smoothly the demo flies: the times from picture to picture, on a display without a screen.
+
+python -m benchmarks.demo
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import re
+import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from benchmarks import measure, page
+from benchmarks.reference import ROOT
+
+RESULTS = Path(__file__).parent / "results"
+SCENES = "fair_weather", "sunset", "above", "storm"
+#: Frames a second that are wanted: the demo's default on a processor, and more.
+RATES = 10, 20
+_LINE = re.compile(r"median (\d+), 95 % (\d+), worst (\d+); (\d+) x (\d+) pixels")
+
+
+@contextmanager
+def display(size: str) -> Iterator[str]:
+    """A display of Xvfb's."""
+    command = ["Xvfb", "-displayfd", "1", "-screen", "0", f"{size}x24", "-nolisten", "tcp"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as server:
+        assert server.stdout is not None
+        yield f":{server.stdout.readline().decode().strip()}"
+        server.terminate()
+
+
+def fly(scene: str, rate: int, frames: int, size: str) -> dict[str, Any]:
+    """A flight ahead through a scene."""
+    demo = ROOT / "target" / "release" / "clouds_demo"
+    arguments = ["--scene", scene, "--rate", str(rate), "--frames", str(frames), "--size", size]
+    with display(size) as name:
+        result = subprocess.run(
+            [demo, "--fly", *arguments],
+            env=os.environ | {"DISPLAY": name},
+            check=True,
+            capture_output=True,
+            text=True,
+        )
+    found = _LINE.search(result.stdout)
+    assert found is not None, result.stdout
+    median, slow, worst, width, height = (int(n) for n in found.groups())
+    times = {"median": median, "slow": slow, "worst": worst}
+    return {"scene": scene, "rate": rate, "size": [width, height]} | times
+
+
+def main() -> None:
+    """Measure, and write benchmarks/results/demo.json and docs/demo.md."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.demo", description=__doc__)
+    parser.add_argument("--frames", type=int, default=200)
+    parser.add_argument("--size", default="1280x720", metavar="WxH")
+    args = parser.parse_args()
+    subprocess.run(["cargo", "build", "--release", "-q", "-p", "clouds_demo"], cwd=ROOT, check=True)
+    command = ["benchmarks.demo", "--frames", str(args.frames), "--size", args.size]
+    width, height = (int(n) for n in args.size.split("x"))
+    header = measure.header(command) | {"size": (width, height), "repeats": 1}
+    rows = [fly(scene, rate, args.frames, args.size) for scene in SCENES for rate in RATES]
+    RESULTS.mkdir(exist_ok=True)
+    (RESULTS / "demo.json").write_text(
+        json.dumps({"header": header, "rows": rows}, indent=1) + "\n"
+    )
+    page.write_demo(RESULTS)
+
+
+if __name__ == "__main__":
+    main()

@@ -47,11 +47,10 @@ def fly(scene: str, rate: int, frames: int, size: str) -> dict[str, Any]:
             capture_output=True,
             text=True,
         )
-    found = _LINE.search(result.stdout)
-    assert found is not None, result.stdout
-    median, slow, worst, width, height = (int(n) for n in found.groups())
-    times = {"median": median, "slow": slow, "worst": worst}
-    return {"scene": scene, "rate": rate, "size": [width, height]} | times
+    pictures, keys = ([int(n) for n in found.groups()] for found in _LINE.finditer(result.stdout))
+    median, slow, worst, *pixels = pictures
+    times = {"median": median, "slow": slow, "worst": worst, "longest_wait": keys[2]}
+    return {"scene": scene, "rate": rate, "size": pixels} | times
 
 
 def main() -> None:

@@ -85,7 +85,7 @@ def _flights(rows: list[Row]) -> str:
             [
                 f"`{row['scene']}`",
                 str(row["rate"]),
-                *(str(row[key]) for key in ("median", "slow", "worst")),
+                *(str(row[key]) for key in ("median", "slow", "worst", "longest_wait")),
                 "×".join(str(side) for side in row["size"]),
             ]
             for row in rows

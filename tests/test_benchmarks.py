@@ -316,7 +316,7 @@ def test_what_counts_is_known(tmp_path, monkeypatch):
 
 def test_no_optimisation_in_closed_form(panels):
     """Every step of a ray reads 4 texels for itself and 22 for its light: 64 steps straight up,
-    128 toward the horizon.
+    128 toward the horizon, and one twice where the way to the first cloud ends.
     """
     camera, _ = FAIR
     width, height = 64, 280
@@ -329,7 +329,7 @@ def test_no_optimisation_in_closed_form(panels):
     up = rays[..., 2] / np.linalg.norm(rays, axis=-1)
     steps = 128 - 64 * up
     reads = panels["no optimisation"]
-    assert (np.abs(reads / 26 - steps)[up > 0.01] <= 0.501).all()
+    assert (np.abs(reads / 26 - steps - 0.5)[up > 0.01] <= 1.001).all()
     assert (reads[up < -0.01] == 0).all() and (up > 0.01).any()
 
 
@@ -422,7 +422,9 @@ def test_memory(sun_volume):
     assert scene["sun_volume"] == (8 * 96 * 96 * 144 if sun_volume else 8)
     bytes_a_pixel = {"clouds": 16, "image": 16, "sky": 16, "cloud_span": 8}
     bytes_a_pixel |= {n: 4 for n in ("cloud_depth", "samples", "active_rays", "depth")}
-    assert still == {n: 96 * 54 * b for n, b in bytes_a_pixel.items()} | {"ray_count": 16}
+    # Corners of cells of 4 x 4 pixels, and one more around them all: two times four numbers each.
+    few = {"ray_count": 16, "corners": 32 * (96 // 4 + 3) * (56 // 4 + 3)}
+    assert still == {n: 96 * 54 * b for n, b in bytes_a_pixel.items()} | few
     bigger = nubis.Renderer(192, 108, quality=quality)
     bigger.render(*FAIR)
     # A ray for each pixel and one more, until they are a degree apart.

@@ -97,6 +97,8 @@ pub struct App {
     last_picture: Instant,
     /// From one picture to the next.
     intervals: Vec<Duration>,
+    /// From one frame of the window to the next, while anything moved: as long may a key wait.
+    waits: Vec<Duration>,
     leaving: bool,
 }
 
@@ -149,6 +151,7 @@ impl App {
             last_step: Instant::now(),
             last_picture: Instant::now(),
             intervals: Vec::new(),
+            waits: Vec::new(),
             leaving: false,
         })
     }
@@ -494,14 +497,18 @@ impl App {
 
     /// Moves the visitor, the clouds and the sun by the time since the last frame.
     fn go_on(&mut self, ui: &Ui, view: &egui::Response) {
-        let seconds = self.last_step.elapsed().as_secs_f64().min(LONGEST_STEP);
+        let waited = self.last_step.elapsed();
         self.last_step = Instant::now();
+        let seconds = waited.as_secs_f64().min(LONGEST_STEP);
         self.capture(ui, view);
         let mut controls = self.controls(ui, view);
         if self.start.fly && self.shown.is_some() {
             controls.toward[0] = 1.0;
         }
         self.flight.step(&controls, seconds);
+        if controls.is_any() {
+            self.waits.push(waited);
+        }
         if self.playing {
             self.time += seconds;
         }
@@ -616,14 +623,15 @@ impl App {
 
     /// What a recorded flight took: the first pictures compile and bake, and are left out.
     fn print_intervals(&self) {
-        let mut milliseconds: Vec<_> = self.intervals.iter().skip(3).map(|time| 1e3 * time.as_secs_f64()).collect();
-        milliseconds.sort_by(f64::total_cmp);
-        let share = |share: f64| milliseconds.get((share * (milliseconds.len() as f64 - 1.0)).round() as usize);
-        if let (Some(median), Some(slow), Some(worst)) = (share(0.5), share(0.95), share(1.0)) {
-            let [width, height] = self.shown.as_ref().map_or([0, 0], |shown| shown.screen.size());
-            println!(
-                "ms from picture to picture: median {median:.0}, 95 % {slow:.0}, worst {worst:.0}; {width} x {height} pixels"
-            );
+        let Some(shown) = &self.shown else { return };
+        let [width, height] = shown.screen.size();
+        for (what, times) in [("from picture to picture", &self.intervals), ("until a key is heard", &self.waits)] {
+            let mut milliseconds: Vec<_> = times.iter().skip(5).map(|time| 1e3 * time.as_secs_f64()).collect();
+            milliseconds.sort_by(f64::total_cmp);
+            let Some(last) = milliseconds.len().checked_sub(1) else { return };
+            let [median, slow, worst] =
+                [0.5, 0.95, 1.0].map(|share| milliseconds[(share * last as f64).round() as usize]);
+            println!("ms {what}: median {median:.0}, 95 % {slow:.0}, worst {worst:.0}; {width} x {height} pixels");
         }
     }
 

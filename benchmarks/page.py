@@ -77,6 +77,7 @@ def _flights(rows: list[Row]) -> str:
         "median ms",
         "slowest twentieth",
         "worst",
+        "longest wait of a key",
         "pixels at the end",
     )
     return _table(

@@ -1,7 +1,7 @@
 //! Shaders that are worked on: read anew when a file of theirs is saved.
 
 use std::ffi::OsString;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
 /// How often the files are looked at.
@@ -32,7 +32,7 @@ impl Watch {
     }
 }
 
-fn last_saved(folder: &PathBuf) -> Option<SystemTime> {
-    let files = [folder.clone(), folder.join("passes")].into_iter().filter_map(|folder| folder.read_dir().ok());
+fn last_saved(folder: &Path) -> Option<SystemTime> {
+    let files = [folder.to_path_buf(), folder.join("passes")].into_iter().filter_map(|folder| folder.read_dir().ok());
     files.flatten().filter_map(|file| file.ok()?.metadata().ok()?.modified().ok()).max()
 }

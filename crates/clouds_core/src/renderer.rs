@@ -393,9 +393,6 @@ impl Renderer {
         scene_depth: Option<SceneDepth<'_>>,
         interrupt: Interrupt<'_>,
     ) -> Result<Vec<f32>> {
-        if Method::new(params, &self.quality) != Method::March {
-            return self.refine(camera, params, time, background, scene_depth, interrupt);
-        }
         self.next_frame(camera, params, time, background, scene_depth, None, interrupt)
     }
 
@@ -413,14 +410,10 @@ impl Renderer {
             let [w, h] = self.size;
             return Err(Error::parameter("screen", format!("{width} x {height}"), format!("of {w} x {h} pixels")));
         }
-        if Method::new(params, &self.quality) != Method::March {
-            let image = self.refine(camera, params, time, true, None, interrupt)?;
-            return screen.write(&self.gpu, &image);
-        }
         self.next_frame(camera, params, time, true, None, Some(screen), interrupt).map(drop)
     }
 
-    /// The next frame of what is marched, onto a screen or, without one, to memory.
+    /// The next frame, onto a screen or, without one, to memory.
     #[expect(clippy::too_many_arguments, reason = "what a frame depends on")]
     fn next_frame(
         &mut self,
@@ -432,6 +425,11 @@ impl Renderer {
         screen: Option<&Screen>,
         interrupt: Interrupt<'_>,
     ) -> Result<Vec<f32>> {
+        if Method::new(params, &self.quality) != Method::March {
+            let image = self.refine(camera, params, time, background, scene_depth, interrupt)?;
+            screen.map_or(Ok(()), |screen| screen.write(&self.gpu, &image))?;
+            return Ok(image);
+        }
         let (mut frame, params) = self.begin(camera, params, time)?;
         scene_depth.map_or(Ok(()), |scene| scene.check(self.size))?;
         let params = &params;

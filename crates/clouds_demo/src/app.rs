@@ -14,7 +14,6 @@ use eframe::egui::{self, Key, PointerButton, Sense, Ui, ViewportCommand};
 use eframe::egui_wgpu::RenderState;
 use eframe::wgpu::FilterMode;
 use egui_plot::{Legend, Line, Plot, PlotPoints};
-use glam::DVec3;
 
 use crate::flight::{Controls, Flight};
 use crate::painter::{Painter, Shown, Wish};
@@ -633,11 +632,6 @@ impl App {
                 [0.5, 0.95, 1.0].map(|share| milliseconds[(share * last as f64).round() as usize]);
             println!("ms {what}: median {median:.0}, 95 % {slow:.0}, worst {worst:.0}; {width} x {height} pixels");
         }
-    }
-
-    /// Puts the visitor elsewhere.
-    pub fn go_to(&mut self, eye: DVec3) {
-        self.flight.eye = eye;
     }
 }
 

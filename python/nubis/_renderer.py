@@ -319,6 +319,17 @@ class Renderer:
                 self._core.animate, camera, params, _time(time), sky, scene_depth, scene_color
             )
 
+    @property
+    def history_length(self) -> npt.NDArray[np.uint32] | None:
+        """How much each pixel of the last frame of `animate` rests on, in frames.
+
+        Shape (height, width). 16 is a ray of its own, in this frame or in one since which it has
+        been followed; less is the mean of guesses from the rays around it in so many frames: what
+        has just come into the picture begins with 1. None where nothing is reprojected: before the
+        first frame, without clouds, and with methods that converge or trace paths.
+        """
+        return self._core.history_length()
+
     def density(
         self, points: npt.ArrayLike, params: Params, *, time: float = 0.0
     ) -> npt.NDArray[np.float32]:

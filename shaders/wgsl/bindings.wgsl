@@ -81,6 +81,9 @@ override LIGHT_CHEAP: bool = true; // there are light samples that do not
 @group(0) @binding(18) var<storage, read_write> fresh_depth: array<f32>;
 @group(0) @binding(19) var<storage, read_write> history: array<vec4f>;
 @group(0) @binding(20) var<storage, read_write> history_depth: array<f32>;
+// How much each pixel rests on, in frames (passes/reproject): in the frame before, and in this one.
+@group(0) @binding(56) var<storage, read_write> history_length: array<u32>;
+@group(0) @binding(57) var<storage, read_write> followed: array<u32>;
 
 // Pixels that are marched one by one: how many are in `active_rays`, and between which distances from the start of its
 // march each pixel's ray meets cloud (passes/refine).

@@ -190,9 +190,11 @@ impl Gpu {
     fn new(adapter: &wgpu::Adapter, info: AdapterInfo) -> Result<Self> {
         let offered = adapter.limits();
         // What the code needs and no more, but as long a buffer as there is: it bounds the size of `animate`'s frames.
-        // `march` names 17 textures; Vulkan promises 16, drivers have 96 and more.
+        // `march` names 17 textures; Vulkan promises 16, drivers have 96 and more. `reproject` names 10 buffers; Vulkan promises
+        // 4, drivers of desktops have 16 and more.
         let limits = wgpu::Limits {
             max_sampled_textures_per_shader_stage: 17,
+            max_storage_buffers_per_shader_stage: 10,
             max_buffer_size: offered.max_buffer_size,
             max_storage_buffer_binding_size: offered.max_storage_buffer_binding_size,
             ..wgpu::Limits::default()

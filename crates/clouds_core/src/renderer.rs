@@ -28,7 +28,7 @@ use crate::passes::phase::PhaseTable;
 use crate::passes::profile::Profile;
 use crate::passes::rays::Rays;
 use crate::passes::refine::{COARSEST, Refined};
-use crate::passes::reproject::{History, ORDER, STRIDE};
+use crate::passes::reproject::{Followed, History, ORDER, STRIDE};
 use crate::passes::shadow::{self, GroundShadow};
 use crate::passes::sky::Sky;
 use crate::passes::sun_volume::SunVolume;
@@ -165,8 +165,8 @@ struct Animation {
     size: [u32; 2],
     refined: Refined,
     fresh: Marched,
-    before: Marched,
-    now: Marched,
+    before: Followed,
+    now: Followed,
     composed: Composed,
     backdrop: Backdrop,
     scene_before: SceneTextures,
@@ -509,7 +509,8 @@ impl Renderer {
             frame.sheet_rows = height;
         } else if last.is_none() {
             frame.sheet_rows = height;
-            march_sheet(&mut ctx, &scene, &mut frame, quality, &mut self.march_pace, refined, now)?;
+            march_sheet(&mut ctx, &scene, &mut frame, quality, &mut self.march_pace, refined, &now.marched)?;
+            now.begin(gpu);
         } else {
             frame.stride = STRIDE;
             [frame.subpixel_x, frame.subpixel_y] = ORDER[index as usize % 16];
@@ -518,7 +519,7 @@ impl Renderer {
             march_sheet(&mut ctx, &scene, &mut frame, quality, &mut self.march_pace, refined, fresh)?;
         }
         if last.is_some() && frame.cloudless == 0 {
-            let old = History { marched: before, scene: scene_before };
+            let old = History { clouds: before, scene: scene_before };
             let mut rays = 0;
             gpu.queue.write_buffer(&refined.count, 0, &[0; 4]);
             in_bands(&mut self.reproject_pace, gpu, &scene, &mut frame, [width, height], |frame| {
@@ -532,10 +533,10 @@ impl Renderer {
             let mut frame = Frame { stride: 1, subpixel_x: 0, subpixel_y: 0, march_width: width, ..frame.clone() };
             frame.spans = 0;
             let mut ctx = Context { gpu, uniforms: scene.uniforms, variant: scene.variant, timings, interrupt };
-            march_listed(&mut ctx, &scene, &mut frame, rays, &mut self.march_pace, refined, now)?;
+            march_listed(&mut ctx, &scene, &mut frame, rays, &mut self.march_pace, refined, &now.marched)?;
         }
         frame.rows = height;
-        let parts = Parts { marched: now, backdrop, refined, out: composed };
+        let parts = Parts { marched: &now.marched, backdrop, refined, out: composed };
         let mut ctx = Context { gpu, uniforms: scene.uniforms, variant: scene.variant, timings, interrupt };
         let by_cells = Method::March.by_cells(&frame, quality);
         compose_sheet(&mut ctx, &scene, &mut frame, &mut self.pixel_pace, &parts, by_cells, false)?;
@@ -604,6 +605,24 @@ impl Renderer {
         };
         self.refining = Some(refining);
         Ok(image)
+    }
+
+    /// How much each pixel of the last frame of [`Renderer::animate`] rests on, row by row, from 1, a guess from the rays
+    /// around it in that frame alone, to 16, a ray of its own that has been followed since; between those, the mean of guesses
+    /// in so many frames. Empty where no frame was reprojected or could be: before the first, after a cut, without clouds, and
+    /// where frames converge or are traced.
+    pub fn history_length(&mut self) -> Result<Vec<u32>> {
+        check_fork()?;
+        let Some(animation) = self.animation.as_ref().filter(|animation| {
+            animation.size == self.size && animation.last.as_ref().is_some_and(|last| last.frame.cloudless == 0)
+        }) else {
+            return Ok(Vec::new());
+        };
+        let pixels = animation.size.map(u64::from).iter().product::<u64>();
+        let mut work = self.gpu.work();
+        work.download(&animation.before.length, 0, 4 * pixels);
+        let lengths = work.submit(&mut Timings::default(), &|| Ok(()))?;
+        Ok(lengths[0].numbers().to_vec())
     }
 
     /// Forgets the frame before: the next one of [`Renderer::animate`] is a still.
@@ -937,8 +956,8 @@ impl Animation {
             size: [width, height],
             refined: Refined::new(gpu, pixels),
             fresh: Marched::new(gpu, cells),
-            before: Marched::new(gpu, pixels),
-            now: Marched::new(gpu, pixels),
+            before: Followed::new(gpu, pixels),
+            now: Followed::new(gpu, pixels),
             composed: Composed::new(gpu, pixels),
             backdrop: Backdrop::new(gpu, [width, height]),
             scene_before: SceneTextures::new(gpu, 0, false),

@@ -480,6 +480,11 @@ impl Renderer {
         py.detach(|| lock(&self.core).cut());
     }
 
+    fn history_length<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        let lengths = detached(py, |_| lock(&self.core).history_length())?;
+        (!lengths.is_empty()).then(|| array(py, lengths, &self.shape(&[]))).transpose()
+    }
+
     fn density<'py>(
         &self,
         py: Python<'py>,

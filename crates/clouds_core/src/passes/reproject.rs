@@ -1,6 +1,6 @@
 //! Temporal reprojection: one pixel in sixteen is marched, the others come from the frame before.
 
-use super::Scene;
+use super::{Bindings, Scene};
 use super::march::Marched;
 use super::refine::Refined;
 use crate::error::Result;
@@ -32,10 +32,45 @@ pub(crate) const ORDER: [[u32; 2]; 16] = [
     [0, 3],
 ];
 
+/// A frame, and what it rests on.
+pub(crate) struct Followed {
+    pub marched: Marched,
+    /// In how many frames each pixel has been guessed, or [`ROUND`] once it has had a ray of its own, and has been followed since.
+    pub length: wgpu::Buffer,
+}
+
+/// Frames in which every pixel is marched once.
+pub(crate) const ROUND: u32 = STRIDE * STRIDE;
+
+impl Followed {
+    pub fn new(gpu: &Gpu, pixels: u64) -> Self {
+        Self { marched: Marched::new(gpu, pixels), length: gpu.buffer("followed", 4 * pixels) }
+    }
+
+    /// Each pixel has been marched.
+    pub fn begin(&self, gpu: &Gpu) {
+        let lengths = vec![ROUND; self.length.size() as usize / 4];
+        gpu.queue.write_buffer(&self.length, 0, bytemuck::cast_slice(&lengths));
+    }
+
+    pub fn bindings(&self) -> Bindings<'_> {
+        [self.marched.bindings(), vec![("followed", (&self.length).into())]].concat()
+    }
+
+    /// As the frame before.
+    fn past(&self) -> Bindings<'_> {
+        vec![
+            ("history", (&self.marched.clouds).into()),
+            ("history_depth", (&self.marched.depth).into()),
+            ("history_length", (&self.length).into()),
+        ]
+    }
+}
+
 /// The frame before.
 pub(crate) struct History<'a> {
     /// Its clouds.
-    pub marched: &'a Marched,
+    pub clouds: &'a Followed,
     /// The user's scene in it.
     pub scene: &'a SceneTextures,
 }
@@ -51,16 +86,15 @@ pub(crate) fn run(
     fresh: &Marched,
     before: &History<'_>,
     refined: &Refined,
-    out: &Marched,
+    out: &Followed,
 ) -> Result<()> {
-    let ours = [
+    let ours = vec![
         ("fresh", (&fresh.clouds).into()),
         ("fresh_depth", (&fresh.depth).into()),
-        ("history", (&before.marched.clouds).into()),
-        ("history_depth", (&before.marched.depth).into()),
         ("scene_before", before.scene.depth()),
     ];
-    let bindings = [scene.bindings.as_slice(), &out.bindings(), &refined.bindings(), &ours].concat();
+    let ours = [before.clouds.past(), out.bindings(), refined.bindings(), ours].concat();
+    let bindings = [scene.bindings.as_slice(), &ours].concat();
     work.dispatch(
         &*gpu.kernel("reproject", "reproject", scene.variant)?,
         &bindings,
@@ -74,10 +108,9 @@ pub(crate) fn rescale(
     work: &mut Work<'_>,
     scene: &Scene<'_>,
     frame: &Frame,
-    before: &Marched,
-    out: &Marched,
+    before: &Followed,
+    out: &Followed,
 ) -> Result<()> {
-    let old = [("history", (&before.clouds).into()), ("history_depth", (&before.depth).into())];
-    let bindings = [scene.bindings.as_slice(), &out.bindings(), &old].concat();
+    let bindings = [scene.bindings.as_slice(), &out.bindings(), &before.past()].concat();
     work.dispatch(&*gpu.kernel("reproject", "rescale", scene.variant)?, &bindings, [frame.width, frame.height, 1])
 }

@@ -85,12 +85,7 @@ enum Method {
 }
 
 /// The kernels of the bakes that are kept from no earlier process.
-const BAKES: [(&str, &str); 4] = [
-    ("transmittance", "transmittance_bake"),
-    ("sky", "sky_map_bake"),
-    ("sky", "air_share_bake"),
-    ("sky", "sky_light_bake"),
-];
+const BAKES: [(&str, &str); 3] = [("sky", "sky_map_bake"), ("sky", "air_share_bake"), ("sky", "sky_light_bake")];
 
 impl Method {
     /// The kernels of a still.

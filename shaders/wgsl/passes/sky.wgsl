@@ -3,8 +3,13 @@
 #import atmosphere
 #import aerial
 
-// Steps of a ray of the sky.
-const STEPS = 48u;
+// Steps of a ray of the sky with the sun low and high, and sines of its height (4 and 10 degrees) between which they change: the
+// edge of the planet's shadow, which rays cross at dusk, needs more. Largest error of a direction against 384 steps, from
+// 10 m to 100 km: 24 steps 1.2 % with the sun at 5 degrees or higher, 4.5 % at 2, 35 % at -3; 48 steps 1 %, at -3 5 %.
+const STEPS_LOW = 48.0;
+const STEPS_HIGH = 24.0;
+const SUN_LOW = 0.07;
+const SUN_HIGH = 0.175;
 
 // The radiance of the sky by azimuth from the sun and angle from the horizon.
 @compute @workgroup_size(8, 8)
@@ -53,8 +58,10 @@ fn air_radiance(direction: vec3f) -> vec3f {
     let from_s = -sqrt(lowest);
     let to_s = sqrt(way.length - lowest);
     var light = AirLight(vec3f(0.0), vec3f(0.0));
-    for (var i = 0u; i < STEPS; i++) {
-        let s = mix(vec3f(from_s), vec3f(to_s), (f32(i) + vec3f(0.0, 0.5, 1.0)) / f32(STEPS));
+    let sun = dot(frame.zenith, frame.sun_direction);
+    let steps = round(mix(STEPS_LOW, STEPS_HIGH, saturate((sun - SUN_LOW) / (SUN_HIGH - SUN_LOW))));
+    for (var i = 0u; i < u32(steps); i++) {
+        let s = mix(vec3f(from_s), vec3f(to_s), (f32(i) + vec3f(0.0, 0.5, 1.0)) / steps);
         let t = lowest + s * abs(s);
         light = air_step(light, direction, way.start + t.y, t.z - t.x);
     }

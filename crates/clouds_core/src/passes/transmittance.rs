@@ -1,7 +1,7 @@
 //! The optical depth of the air to space, by altitude and direction.
 
 use super::weather::bake_map;
-use super::{Baked, Bindings, Context};
+use super::{Baked, Bindings, Context, kept};
 use crate::error::Result;
 use crate::params::{self, Params};
 
@@ -19,9 +19,13 @@ impl Transmittance {
     }
 
     pub fn run(&mut self, ctx: &mut Context<'_>, params: &Params) -> Result<Bindings<'_>> {
-        let view = self.made.get(air(params), || {
+        let from = air(params);
+        let key = format!("{from:?}");
+        let view = self.made.get(from, || {
             let texture = ctx.gpu.texture("air_depth", SIZE, 1);
-            bake_map(ctx, "transmittance", "transmittance_bake", &texture)?;
+            kept(ctx, "transmittance", &key, &[&texture], |ctx| {
+                bake_map(ctx, "transmittance", "transmittance_bake", &texture)
+            })?;
             Ok(texture.create_view(&wgpu::TextureViewDescriptor::default()))
         })?;
         Ok(vec![("air_depth", view.into())])

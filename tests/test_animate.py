@@ -238,3 +238,59 @@ def test_the_sky_is_baked_every_so_often():
         np.testing.assert_allclose(after[:11], before[:11], rtol=5e-3)  # above the horizon
     fresh = nubis.Renderer(32, 18).render(camera, params)
     assert fresh.tobytes() == pictures[-1].tobytes()
+
+
+def test_history_grows_until_each_pixel_has_had_its_ray():
+    make = nubis.Renderer(*SIZE, quality="draft")
+    shots = [(look(0), PARAMS, 0.0)] * 2 + [(look(12), PARAMS, 0.0)] * 18
+    frames = make.animate(shots)
+    lengths = []
+    assert make.history_length is None
+    for _ in shots:
+        next(frames)
+        assert make.history_length.shape == SIZE[::-1]
+        lengths.append(make.history_length)
+    assert (lengths[1] == 16).all()
+    # What comes in at the right has been guessed, but for one pixel in sixteen; so are others once more in each frame.
+    new = lengths[2] < 16
+    assert not new[:, : SIZE[0] // 2].any() and new[:52, -8:].mean() == 15 / 16
+    assert (lengths[2][new] == 1).all()
+    for i, length in enumerate(lengths[2:]):
+        own = length == 16
+        assert (length[~own] == 1 + i).all()
+        assert own[:52, -8:].mean() == min(1 + i, 16) / 16
+    assert (lengths[-1] == 16).all()
+
+
+def test_what_has_come_into_the_picture_becomes_the_mean_of_guesses(renderer):
+    make = renderer(*SIZE)
+    still = colours(make.render(look(12), PARAMS))
+    shots = [(look(0), PARAMS, 0.0)] + [(look(12), PARAMS, 0.0)] * 10
+    errors = []
+    for i, frame in enumerate(make.animate(shots)):
+        if i in (1, 10):
+            young = make.history_length < 16
+            errors.append(np.abs(colours(frame) - still)[:, -8:][young[:, -8:]].mean())
+    # 0.82; without the mean, by the limits of its neighbourhood alone, 0.99.
+    assert errors[1] < 0.9 * errors[0]
+
+
+def test_history_goes_with_the_clouds():
+    make = nubis.Renderer(*SIZE, quality="draft")
+    list(make.animate([(look(azimuth), PARAMS, 0.0) for azimuth in (0, 12, 14, 16, 18)]))
+    young = (make.history_length < 16)[:52].mean(axis=0) > 0.5
+    # What was the right edge of the first picture is where its direction is in the last.
+    half = np.arctan(np.tan(np.radians(0.5 * look(0).fov)) * SIZE[0] / SIZE[1])
+    edge = 0.5 * SIZE[0] * (1 + np.tan(half - np.radians(18)) / np.tan(half))
+    assert np.flatnonzero(young)[0] == pytest.approx(edge, abs=2.5)
+    assert young[int(edge) + 3 :].mean() > 0.8
+
+
+def test_without_reprojection_there_is_no_history(renderer):
+    clear = PARAMS.with_(**{"clouds.coverage": 0.0})
+    make = renderer(*SIZE)
+    list(make.animate([(CAMERA, clear, 0.0)] * 2))
+    assert make.history_length is None
+    path = renderer(8, 4, "reference")
+    list(path.animate([(CAMERA, PARAMS, 0.0)]))
+    assert path.history_length is None

@@ -14,7 +14,7 @@ use clouds_core::schema::Map;
 use clouds_core::{Camera, Error, Gpu, Params, Quality, Renderer, Result, Screen, color, files};
 
 use crate::resolution::Resolution;
-use crate::sight::{Sight, error_pixels, pixels_of};
+use crate::sight::{Sight, error_pixels, history_pixels, pixels_of};
 
 /// How long everything has to stand still before it is rendered at its best.
 const REST: Duration = Duration::from_millis(300);
@@ -294,15 +294,21 @@ impl<'a> Work<'a> {
         };
         if at_rest {
             self.look_at_weather(params, &interrupt)?;
+        }
+        // A still has no history: that of the moving picture goes on.
+        if at_rest && wish.sight != Sight::History {
             return self.paint_still(wish, wish.window, &wish.quality, &interrupt);
         }
         let size = wish.wanted.map_or(wish.window, |_| self.resolution.of(wish.window));
-        if wish.sight != Sight::Picture {
+        if !matches!(wish.sight, Sight::Picture | Sight::History) {
             return self.paint_still(wish, size, &wish.moving_quality, &interrupt);
         }
         let screen = self.screen(wish, size)?;
         self.moving.set(size[0], size[1], wish.moving_quality.clone())?;
-        if let Some(folder) = &wish.record {
+        if wish.sight == Sight::History {
+            self.moving.animate(camera, params, *time, true, None, &interrupt)?;
+            screen.write_pixels(self.gpu, &history_pixels(&self.moving.history_length()?, size))?;
+        } else if let Some(folder) = &wish.record {
             let image = self.moving.animate(camera, params, *time, true, None, &interrupt)?;
             screen.write(self.gpu, &image)?;
             let path = folder.join(format!("frame{:05}.png", self.count));

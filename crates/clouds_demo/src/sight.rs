@@ -6,6 +6,8 @@ use clouds_core::renderer::Picture;
 pub const WHITE: f32 = 500.0;
 /// Relative error of luminance that is white.
 pub const WHITE_ERROR: f32 = 0.2;
+/// Frames of history that are white: a ray for every pixel.
+const WHITE_HISTORY: f32 = 16.0;
 /// The distance at which half of the light is left in the picture of depth, m.
 const HALF: f32 = 5000.0;
 
@@ -21,13 +23,16 @@ pub enum Sight {
     Depth,
     /// What each pixel costs.
     Heat,
+    /// How many frames each pixel of a moving picture rests on.
+    History,
     /// How far the picture is from `reference`, at rest, in larger pixels.
     Error,
 }
 
 impl Sight {
     /// All of them.
-    pub const ALL: [Self; 5] = [Self::Picture, Self::Transmittance, Self::Depth, Self::Heat, Self::Error];
+    pub const ALL: [Self; 6] =
+        [Self::Picture, Self::Transmittance, Self::Depth, Self::Heat, Self::History, Self::Error];
 
     /// Its name.
     pub fn name(self) -> &'static str {
@@ -36,13 +41,14 @@ impl Sight {
             Self::Transmittance => "transmittance",
             Self::Depth => "depth",
             Self::Heat => "density evaluations",
+            Self::History => "history length",
             Self::Error => "error",
         }
     }
 
     /// Whether it is made of the layers of a picture.
     pub fn is_of_layers(self) -> bool {
-        !matches!(self, Self::Picture | Self::Error)
+        matches!(self, Self::Transmittance | Self::Depth | Self::Heat)
     }
 }
 
@@ -50,7 +56,7 @@ impl Sight {
 pub fn pixels_of(sight: Sight, picture: &Picture) -> Vec<u8> {
     let grey = |v: f32| [v, v, v];
     let color = |i: usize| match sight {
-        Sight::Picture | Sight::Error | Sight::Transmittance => grey(1.0 - picture.image[4 * i + 3]),
+        Sight::Picture | Sight::Error | Sight::History | Sight::Transmittance => grey(1.0 - picture.image[4 * i + 3]),
         Sight::Depth if picture.depth[i] < 0.0 => grey(0.0),
         Sight::Depth => grey(1.0 / (1.0 + picture.depth[i] / HALF)),
         Sight::Heat => heat(picture.samples[i] as f32 / WHITE),
@@ -68,6 +74,15 @@ pub fn error_pixels(picture: &Picture, truth: &Picture) -> Vec<u8> {
             opaque(heat((a - b).abs() / b.max(1e-12) / WHITE_ERROR))
         })
         .collect()
+}
+
+/// The pixels of the lengths of histories ([`clouds_core::Renderer::history_length`]), from nearly black for what has just come
+/// into the picture to white for what has had a ray of its own; black where there is none.
+pub fn history_pixels(lengths: &[u32], [width, height]: [u32; 2]) -> Vec<u8> {
+    if lengths.is_empty() {
+        return opaque([0.0; 3]).repeat(width as usize * height as usize);
+    }
+    lengths.iter().flat_map(|length| opaque(heat(*length as f32 / WHITE_HISTORY))).collect()
 }
 
 /// Black, red, yellow, white from 0 to 1.
@@ -91,6 +106,12 @@ mod tests {
         // A tenth of two tenths: between red and yellow.
         let [red, green, blue, _] = error_pixels(&a, &b)[..] else { panic!("one pixel") };
         assert!(red == 255 && (127..=129).contains(&green) && blue == 0, "{red} {green} {blue}");
+    }
+
+    #[test]
+    fn a_history_grows_brighter() {
+        assert_eq!(history_pixels(&[], [2, 1]), [0, 0, 0, 255].repeat(2));
+        assert_eq!(history_pixels(&[1, 8, 16], [3, 1]), [48, 0, 0, 255, 255, 128, 0, 255, 255, 255, 255, 255]);
     }
 
     #[test]

@@ -294,19 +294,3 @@ def test_without_reprojection_there_is_no_history(renderer):
     path = renderer(8, 4, "reference")
     list(path.animate([(CAMERA, PARAMS, 0.0)]))
     assert path.history_length is None
-
-
-@pytest.mark.parametrize("turn", [0.0, 0.2])
-def test_small_clouds_between_rays_are_seen_in_the_frame_before(turn):
-    """A lattice of rays half a degree apart, one of sixteen pixels each, against all rays."""
-    params = PARAMS.with_(**{"clouds.coverage": 0.4, "high_clouds.coverage": 0.0})
-    eye = np.array((0, 0, 300))
-    shots = []
-    for i in range(34):
-        camera = nubis.Camera.look_at(eye, eye + twin.compass(turn * i, 10), (0, 0, 1), 16.0)
-        shots.append((camera, params, i / 24))
-    lattice, every = nubis.quality("draft"), nubis.quality("draft").replace(contrast=0.0)
-    *_, fast = nubis.Renderer(240, 136, quality=lattice).animate(shots)
-    *_, slow = nubis.Renderer(240, 136, quality=every).animate(shots)
-    # 0.050 and 0.038; 0.089 and 0.079 where the frame before is left out.
-    assert twin.relative_rmse(colours(fast), colours(slow)) < 0.06

@@ -83,16 +83,6 @@ fn in_picture(pixel: vec2i) -> bool {
     return within.y && (within.x || CAMERA == EQUIRECT);
 }
 
-// The number of a pixel, or of the one at the edge that is nearest to it; a panorama goes on around.
-fn pixel_index(pixel: vec2i) -> u32 {
-    let size = vec2i(vec2u(frame.width, frame.height));
-    var inside = clamp(pixel, vec2i(0), size - 1);
-    if CAMERA == EQUIRECT {
-        inside.x = (pixel.x % size.x + size.x) % size.x;
-    }
-    return u32(inside.y) * frame.width + u32(inside.x);
-}
-
 // The same motion across a picture, around a panorama the shorter way.
 fn shortest_way(motion: vec2f) -> vec2f {
     if CAMERA == EQUIRECT {

@@ -92,7 +92,7 @@ impl Method {
     fn kernels(self, params: &Params, quality: &Quality, frame: &Frame, variant: Variant, layers: bool) -> Vec<Wanted> {
         let clouds: &[_] = match self {
             _ if frame.cloudless > 0 => &[],
-            Self::March if refine::coarsest(frame, quality, false) > 1 => &[("march", "march_list"), ("refine", "refine")],
+            Self::March if refine::coarsest(frame, quality) > 1 => &[("march", "march_list"), ("refine", "refine")],
             Self::March => &[("march", "march")],
             Self::Reference => &[("reference", "reference")],
             Self::Path => &[("path", "path")],
@@ -309,7 +309,7 @@ impl Renderer {
             world.run(gpu, params, &frame, (camera.eye, time), quality, timings, interrupt)
         })?;
 
-        let lattice = refine::coarsest(&frame, quality, false) > 1;
+        let lattice = refine::coarsest(&frame, quality) > 1;
         let by_cells = method.by_cells(&frame, quality);
         let mut picture = Picture::default();
         for sheet in sheets([width, height], method) {
@@ -339,7 +339,7 @@ impl Renderer {
                 }
                 _ => {
                     let pace = &mut self.march_pace;
-                    march_sheet(&mut ctx, &scene, &mut frame, quality, pace, &still.refined, None, &still.marched)?;
+                    march_sheet(&mut ctx, &scene, &mut frame, quality, pace, &still.refined, &still.marched)?;
                 }
             }
             let Still { marched, refined, composed, backdrop, rays, .. } = still;
@@ -504,14 +504,14 @@ impl Renderer {
             frame.sheet_rows = height;
         } else if last.is_none() {
             frame.sheet_rows = height;
-            march_sheet(&mut ctx, &scene, &mut frame, quality, &mut self.march_pace, refined, None, &now.marched)?;
+            march_sheet(&mut ctx, &scene, &mut frame, quality, &mut self.march_pace, refined, &now.marched)?;
             now.begin(gpu);
         } else {
             frame.stride = STRIDE;
             [frame.subpixel_x, frame.subpixel_y] = ORDER[index as usize % 16];
             frame.march_width = cells[0];
             frame.sheet_rows = cells[1];
-            march_sheet(&mut ctx, &scene, &mut frame, quality, &mut self.march_pace, refined, Some(before), fresh)?;
+            march_sheet(&mut ctx, &scene, &mut frame, quality, &mut self.march_pace, refined, fresh)?;
         }
         if last.is_some() && frame.cloudless == 0 {
             let old = History { clouds: before, scene: scene_before };
@@ -1031,9 +1031,7 @@ fn sheets([width, height]: [u32; 2], method: Method) -> impl Iterator<Item = Ran
     (0..height).step_by(rows as usize).map(move |row| row..(row + rows).min(height))
 }
 
-/// Marches a sheet of a still, or of a frame that has one `before` it: the pixels of a lattice, then those between rays that do
-/// not look alike, or all of them.
-#[expect(clippy::too_many_arguments, reason = "what rays are chosen by")]
+/// Marches a sheet of a still: the pixels of a lattice, then those between rays that do not look alike, or all of them.
 fn march_sheet(
     ctx: &mut Context<'_>,
     scene: &Scene<'_>,
@@ -1041,11 +1039,10 @@ fn march_sheet(
     quality: &Quality,
     pace: &mut Pace,
     refined: &Refined,
-    before: Option<&Followed>,
     out: &Marched,
 ) -> Result<()> {
     let (gpu, interrupt) = (ctx.gpu, ctx.interrupt);
-    let coarsest = refine::coarsest(frame, quality, before.is_some());
+    let coarsest = refine::coarsest(frame, quality);
     if coarsest == 1 {
         let size = [frame.march_width, frame.sheet_row + frame.sheet_rows];
         return in_bands(pace, gpu, scene, frame, size, |frame| {
@@ -1064,7 +1061,7 @@ fn march_sheet(
         }
         scene.uniforms.upload_frame(gpu, &frame);
         let mut work = gpu.work();
-        refine::run(gpu, &mut work, scene, &frame, refined, before, out)?;
+        refine::run(gpu, &mut work, scene, &frame, refined, out)?;
         work.download(&refined.count, 0, 4);
         rays = work.submit(ctx.timings, interrupt)?[0].numbers()[0];
         frame.lattice /= 2;

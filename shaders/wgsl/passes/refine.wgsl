@@ -9,58 +9,17 @@
 
 @compute @workgroup_size(8, 8)
 fn refine(@builtin(global_invocation_id) id: vec3u) {
-    let square = square_of(id.xy);
-    if square.has.x {
-        settle(square.top, square.above, square.top_between);
-    }
-    if square.has.y {
-        settle(square.side, square.left, square.side_between);
-    }
-    if all(square.has) {
-        settle(square.middle, square.own, square.middle_between);
-    }
-}
-
-// In an animation what the frame before had between the rays counts as well: farther apart than in a still, they are not likely
-// to miss the same small cloud twice.
-@compute @workgroup_size(8, 8)
-fn refine_again(@builtin(global_invocation_id) id: vec3u) {
-    let square = square_of(id.xy);
-    if square.has.x {
-        settle(square.top, with_past(square.above, square.top, square.top_between), square.top_between);
-    }
-    if square.has.y {
-        settle(square.side, with_past(square.left, square.side, square.side_between), square.side_between);
-    }
-    if all(square.has) {
-        settle(square.middle, with_past(square.own, square.middle, square.middle_between), square.middle_between);
-    }
-}
-
-// The pixels that a square of the lattice adds, how the corners around each look, and what lies between those.
-struct Square {
-    has: vec2<bool>, // room for a pixel between the columns, between the rows
-    top: vec2u,
-    side: vec2u,
-    middle: vec2u,
-    above: Looks,
-    left: Looks,
-    own: Looks,
-    top_between: Known,
-    side_between: Known,
-    middle_between: Known,
-}
-
-fn square_of(number: vec2u) -> Square {
     let last = vec2u(frame.march_width, frame.sheet_rows) - 1u;
+    if any(id.xy > (last + frame.lattice - 1u) / frame.lattice) {
+        return;
+    }
     let half = frame.lattice / 2u;
-    let low = min(number * frame.lattice, last);
+    let low = min(id.xy * frame.lattice, last);
     let high = min(low + frame.lattice, last);
     let middle = low + half;
-    var square: Square;
-    square.has = middle < high;
-    if !any(square.has) {
-        return square;
+    let has = middle < high; // room for a pixel between the columns, between the rows
+    if !any(has) {
+        return;
     }
     // Of the squares above and to the left, narrower behind the last column and row; on the rim the square itself again.
     let before = (max(low, vec2u(1u)) - 1u) / frame.lattice * frame.lattice;
@@ -69,53 +28,20 @@ fn square_of(number: vec2u) -> Square {
     let b = read(vec2u(high.x, low.y));
     let c = read(vec2u(low.x, high.y));
     let d = read(high);
+    let own = joined(joined(looks(a), looks(b)), joined(looks(c), looks(d)));
     let above = joined(looks(read(vec2u(low.x, before.y))), looks(read(vec2u(high.x, before.y))));
     let left = joined(looks(read(vec2u(before.x, low.y))), looks(read(vec2u(before.x, high.y))));
     let share = vec2f(middle - low) / vec2f(max(high - low, vec2u(1u)));
-    square.top = vec2u(middle.x, low.y);
-    square.side = vec2u(low.x, middle.y);
-    square.middle = middle;
-    square.own = joined(joined(looks(a), looks(b)), joined(looks(c), looks(d)));
-    square.above = joined(square.own, above);
-    square.left = joined(square.own, left);
-    square.top_between = mixed(a, b, share.x);
-    square.side_between = mixed(a, c, share.y);
-    square.middle_between = mixed(mixed(a, b, share.x), mixed(c, d, share.x), share.y);
-    return square;
-}
-
-// The looks of the corners around a pixel, and of the frame before around where it was: of nine pixels half as far apart as
-// it is from the corners.
-fn with_past(around: Looks, cell: vec2u, between: Known) -> Looks {
-    let pixel = marched_pixel(vec2u(cell.x, frame.sheet_row + cell.y));
-    let centre = vec2f(pixel) + 0.5;
-    let away = select(frame.far_distance, between.distance.x / between.distance.y, between.distance.y > 0.0);
-    let direction = away * view_direction(centre).xyz + frame.eye_motion - frame.cloud_motion;
-    let was = previous_pixel(normalize(direction));
-    let motion = select(shortest_way(was.xy - centre), vec2f(0.0), frame.moving == 0u);
-    let at = vec2i(pixel) + vec2i(round(motion));
-    let apart = i32(frame.stride * frame.lattice / 4u);
-    var both = around;
-    var i = 0;
-    loop {
-        let past = history[pixel_index(at + apart * (vec2i(i % 3, i / 3) - 1))];
-        both = joined(both, Looks(vec2f(max(max(past.r, past.g), past.b)), past.aa, NOWHERE, NO_SCENE));
-        if i == 8 {
-            break;
-        }
-        i++;
+    if has.x {
+        settle(vec2u(middle.x, low.y), joined(own, above), mixed(a, b, share.x));
     }
-    // What comes into the picture has no past, and clouds that the corners do not have may be anywhere.
-    let new_here = (was.z <= 0.0 && frame.moving > 0u) || !in_picture(at);
-    both.scene = select(both.scene, 0.0, new_here);
-    if contrast_of(both) > quality.contrast && contrast_of(around) <= quality.contrast {
-        both.span = EVERYWHERE;
+    if has.y {
+        settle(vec2u(low.x, middle.y), joined(own, left), mixed(a, c, share.y));
     }
-    return both;
+    if all(has) {
+        settle(middle, own, mixed(mixed(a, b, share.x), mixed(c, d, share.x), share.y));
+    }
 }
-
-const EVERYWHERE = vec2f(0.0, 1e30); // as in march.wgsl
-const NOWHERE = vec2f(1e30, 0.0);
 
 // What is known of a pixel.
 struct Known {
@@ -167,8 +93,15 @@ fn settle(pixel: vec2u, around: Looks, between: Known) {
     let index = pixel.y * frame.march_width + pixel.x;
     // Rays that the user's scene ends say nothing of what lies behind it: each ray beside it is marched, and all of it.
     let open = min(around.scene, scene_at(pixel)) >= NO_SCENE;
-    cloud_span[index] = select(EVERYWHERE, around.span, open);
-    if contrast_of(around) > quality.contrast || !open {
+    cloud_span[index] = select(vec2f(0.0, 1e30), around.span, open);
+    // Light counts by what it is seen against: the brightest corner, or the sky behind it.
+    let backdrop = max(max(sky_light[0].r, sky_light[0].g), sky_light[0].b);
+    let against = max(around.light.y, around.transmittance.y * backdrop);
+    let contrast = max(
+        around.transmittance.y - around.transmittance.x,
+        (around.light.y - around.light.x) / max(against, 1e-30),
+    );
+    if contrast > quality.contrast || !open {
         active_rays[atomicAdd(&ray_count, 1u)] = index;
     } else {
         let distance = between.distance;
@@ -176,14 +109,4 @@ fn settle(pixel: vec2u, around: Looks, between: Known) {
         cloud_depth[index] = select(-1.0, distance.x / distance.y, distance.y > 0.0);
         samples[index] = 0u;
     }
-}
-
-fn contrast_of(around: Looks) -> f32 {
-    // Light counts by what it is seen against: the brightest corner, or the sky behind it.
-    let backdrop = max(max(sky_light[0].r, sky_light[0].g), sky_light[0].b);
-    let against = max(around.light.y, around.transmittance.y * backdrop);
-    return max(
-        around.transmittance.y - around.transmittance.x,
-        (around.light.y - around.light.x) / max(against, 1e-30),
-    );
 }

@@ -238,6 +238,15 @@ fn fresh_index(cell: vec2i) -> u32 {
     return inside.y * frame.march_width + inside.x;
 }
 
+fn pixel_index(pixel: vec2i) -> u32 {
+    let size = vec2i(vec2u(frame.width, frame.height));
+    var inside = clamp(pixel, vec2i(0), size - 1);
+    if CAMERA == EQUIRECT {
+        inside.x = (pixel.x % size.x + size.x) % size.x;
+    }
+    return u32(inside.y) * frame.width + u32(inside.x);
+}
+
 // A row of the frame before, between the pixels across: four values from seven pixels.
 fn history_row(at: vec2i, weights: vec4f) -> mat4x4f {
     let p0 = history[pixel_index(at)];

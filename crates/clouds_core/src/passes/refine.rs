@@ -3,7 +3,6 @@
 use std::f32::consts::PI;
 
 use super::march::Marched;
-use super::reproject::Followed;
 use super::{Bindings, Scene};
 use crate::error::Result;
 use crate::frame::Frame;
@@ -56,31 +55,23 @@ impl Refined {
     }
 }
 
-/// The same as an angle where the frame before is known, which has what is missed between them.
-const WIDEST_AGAIN: f32 = 2.0 * WIDEST;
-
 /// The distance to begin with; 1 marches every pixel.
-pub(crate) fn coarsest(frame: &Frame, quality: &Quality, again: bool) -> u32 {
-    let widest = if again { WIDEST_AGAIN } else { WIDEST };
-    let fits = |n: &u32| quality.contrast > 0.0 && *n as f32 * frame.marched_angle() <= widest;
+pub(crate) fn coarsest(frame: &Frame, quality: &Quality) -> u32 {
+    let fits = |n: &u32| quality.contrast > 0.0 && *n as f32 * frame.marched_angle() <= WIDEST;
     [COARSEST, 2].into_iter().find(fits).unwrap_or(1)
 }
 
-/// Halves the distance `frame.lattice` of the lattice: interpolates `out`, or lists pixels to be marched, also for what the
-/// frame `before` has between those that are known.
+/// Halves the distance `frame.lattice` of the lattice: interpolates `out`, or lists pixels to be marched.
 pub(crate) fn run(
     gpu: &Gpu,
     work: &mut Work<'_>,
     scene: &Scene<'_>,
     frame: &Frame,
     refined: &Refined,
-    before: Option<&Followed>,
     out: &Marched,
 ) -> Result<()> {
-    let past = before.map_or(Vec::new(), Followed::past);
-    let bindings = [scene.bindings.as_slice(), &out.bindings(), &refined.bindings(), &past].concat();
-    let kernel = if before.is_some() { "refine_again" } else { "refine" };
+    let bindings = [scene.bindings.as_slice(), &out.bindings(), &refined.bindings()].concat();
     let [width, height] = [frame.march_width, frame.sheet_rows].map(|size| (size - 1).div_ceil(frame.lattice) + 1);
     work.clear(&refined.count);
-    work.dispatch(&*gpu.kernel("refine", kernel, scene.variant)?, &bindings, [width, height, 1])
+    work.dispatch(&*gpu.kernel("refine", "refine", scene.variant)?, &bindings, [width, height, 1])
 }

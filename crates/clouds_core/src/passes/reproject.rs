@@ -58,7 +58,7 @@ impl Followed {
     }
 
     /// As the frame before.
-    pub fn past(&self) -> Bindings<'_> {
+    fn past(&self) -> Bindings<'_> {
         vec![
             ("history", (&self.marched.clouds).into()),
             ("history_depth", (&self.marched.depth).into()),

@@ -445,7 +445,8 @@ impl Frame {
         self.forward = camera.forward.as_vec3().to_array();
     }
 
-    fn set_planet(&mut self, eye: DVec3, params: &Params) {
+    /// Puts the planet under an eye.
+    pub(crate) fn set_planet(&mut self, eye: DVec3, params: &Params) {
         let radius = f64::from(params.atmosphere.planet_radius);
         let from_centre = eye + DVec3::Z * radius;
         let distance = from_centre.length();

@@ -1,9 +1,14 @@
 //! The shadows of clouds on the air of a picture: crepuscular rays.
 
+use glam::{DVec2, DVec3};
+
+use super::sky::near;
+use super::sun_volume::{Shadows, shadows};
 use super::{Baked, Bindings, Context};
 use crate::error::Result;
 use crate::frame::Frame;
 use crate::kernel::{Variant, Wanted};
+use crate::params::{self, Params};
 
 /// Angle between rays in the middle of the picture, radians, most of them along a side (393 go around a panorama), and slices
 /// of their distance.
@@ -11,9 +16,17 @@ const ANGLE: f32 = 0.016;
 const MOST: u32 = 400;
 const SLICES: u32 = 32;
 
-/// The volume on the GPU, for pictures of one kind after another.
+/// Eye and shadows may move so far while the volume stays, m: a quarter of a texel of the shadows. What the air lacks is seen
+/// from the middle of such a step, so that it follows from the picture alone, not from those before.
+const STEP: f64 = 16.0;
+
+/// What the volume is made from: its size, the camera's axes, its fields of view and the sky's scale, sun, air and shadows, from
+/// where, and where the shadows are.
+type Key = ([u32; 3], [[f32; 3]; 3], [f32; 3], params::Sun, params::Atmosphere, Shadows, [f64; 3], [f64; 2]);
+
+/// The volume on the GPU.
 pub(crate) struct Beams {
-    made: Baked<[u32; 3], wgpu::TextureView>,
+    made: Baked<Key, wgpu::TextureView>,
 }
 
 /// Texels for a picture.
@@ -38,17 +51,36 @@ impl Beams {
     }
 
     /// `world` holds the uniforms, the air and the shadows on the ground.
-    pub fn run(&mut self, ctx: &mut Context<'_>, frame: &Frame, world: &Bindings<'_>) -> Result<Bindings<'_>> {
+    pub fn run(
+        &mut self,
+        ctx: &mut Context<'_>,
+        params: &Params,
+        frame: &Frame,
+        eye: DVec3,
+        world: &Bindings<'_>,
+    ) -> Result<Bindings<'_>> {
         let size = size(frame);
-        let texture = || ctx.gpu.texture_3d("beams", size);
-        let view = self.made.get(size, || Ok(texture().create_view(&wgpu::TextureViewDescriptor::default())))?;
-        // They depend on the camera, and so are new with every picture.
-        if let Some((pass, entry, variant)) = kernel(ctx.variant) {
-            let bindings = [world.as_slice(), &[("volume_out", view.into())]].concat();
-            let mut work = ctx.gpu.work();
-            work.dispatch(&*ctx.gpu.kernel(pass, entry, variant)?, &bindings, [size[0], size[1], 1])?;
-            work.submit(ctx.timings, ctx.interrupt)?;
-        }
+        let axes = [frame.right, frame.up, frame.forward];
+        let scales = [frame.tan_half_fov, frame.half_fov, frame.sky_scale];
+        let from = near(eye, params, STEP);
+        let shadow = DVec2::from_array(frame.shadow_eye.map(f64::from)) + from.truncate() - eye.truncate();
+        let shadow = ((shadow / STEP).round() * STEP).to_array();
+        let (sun, air) = (params.sun.clone(), params.atmosphere.clone());
+        let key = (size, axes, scales, sun, air, shadows(params), from.to_array(), shadow);
+        let view = self.made.get(key, || {
+            let view = ctx.gpu.texture_3d("beams", size).create_view(&wgpu::TextureViewDescriptor::default());
+            if let Some((pass, entry, variant)) = kernel(ctx.variant) {
+                let mut there = Frame { shadow_eye: shadow.map(|v| v as f32), ..frame.clone() };
+                there.set_planet(from, params);
+                ctx.uniforms.upload_frame(ctx.gpu, &there);
+                let bindings = [world.as_slice(), &[("volume_out", (&view).into())]].concat();
+                let mut work = ctx.gpu.work();
+                work.dispatch(&*ctx.gpu.kernel(pass, entry, variant)?, &bindings, [size[0], size[1], 1])?;
+                work.submit(ctx.timings, ctx.interrupt)?;
+                ctx.uniforms.upload_frame(ctx.gpu, frame);
+            }
+            Ok(view)
+        })?;
         Ok(vec![("beams", view.into())])
     }
 }

@@ -21,12 +21,17 @@ type Key = (params::Sun, params::Atmosphere, [f64; 3], [f32; 3]);
 /// every few metres of height or hundreds of metres of way, not in every frame. What that costs: half a percent of
 /// the height, which changes the sky by less than that, and a hundredth of a degree of the sun's elevation.
 fn viewpoint(eye: DVec3, params: &Params) -> DVec3 {
+    near(eye, params, 1e-4 * f64::from(params.atmosphere.planet_radius))
+}
+
+/// A place near the eye, the same for all eyes around it: at most half a `step` beside it, m, and half a percent of its height,
+/// or half a metre, above or below.
+pub(super) fn near(eye: DVec3, params: &Params, step: f64) -> DVec3 {
     let radius = f64::from(params.atmosphere.planet_radius);
     let centre = DVec3::new(0.0, 0.0, -radius);
     let height = (eye - centre).length() - radius;
     let steps = ((1.0 + height.abs() / 100.0).ln() * 100.0).round();
     let height = 100.0 * ((steps / 100.0).exp() - 1.0) * height.signum();
-    let step = 1e-4 * radius;
     let place = (eye / step).round() * step - centre;
     centre + place.try_normalize().unwrap_or(DVec3::Z) * (radius + height)
 }

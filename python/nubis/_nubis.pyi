@@ -14,6 +14,7 @@ __all__ = [
     "DensityGrid",
     "Renderer",
     "adapters",
+    "auto_exposure",
     "cache_usage",
     "check",
     "check_params",
@@ -257,6 +258,9 @@ def read_pixels(path: str | PathLike[str]) -> npt.NDArray[np.float32]:
 def to_srgb8(
     frame: npt.NDArray[np.float32], exposure: float, tonemap: str
 ) -> npt.NDArray[np.uint8]: ...
+def auto_exposure(
+    frame: npt.NDArray[np.float32], key: float, low: float, high: float
+) -> float: ...
 def write_png(path: str | PathLike[str], frame: npt.NDArray[np.uint8]) -> None: ...
 def write_exr(path: str | PathLike[str], frame: npt.NDArray[np.float32]) -> None: ...
 def write_hdr(path: str | PathLike[str], frame: npt.NDArray[np.float32]) -> None: ...

@@ -4,10 +4,12 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use clouds_core::Gpu;
+use clouds_core::color::{Metering, auto_exposure};
 use clouds_demo::app::{App, Start};
+use eframe::egui::accesskit::Role;
 use eframe::egui::{self, Key, OutputCommand};
 use egui_kittest::Harness;
-use egui_kittest::kittest::Queryable as _;
+use egui_kittest::kittest::{NodeT as _, Queryable as _};
 
 /// How long a picture may take on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -35,6 +37,17 @@ fn at_rest(harness: &mut Harness<'_, App>) {
     });
 }
 
+/// What is copied as Python.
+fn copied(harness: &mut Harness<'_, App>) -> String {
+    harness.get_by_label("Copy as Python").click();
+    harness.step();
+    let copied = harness.output().platform_output.commands.iter().find_map(|command| match command {
+        OutputCommand::CopyText(text) => Some(text.clone()),
+        _ => None,
+    });
+    copied.expect("is copied")
+}
+
 #[test]
 fn keys_fly_and_the_picture_follows() {
     let mut harness = window(Start::default());
@@ -57,13 +70,14 @@ fn the_search_leaves_the_fields_that_are_meant_and_they_change_the_sky() {
     let mut harness = window(Start::default());
     harness.run_steps(2);
     assert!(harness.query_by_label("clouds").is_some());
-    harness.get_by_role(egui::accesskit::Role::TextInput).focus();
+    harness.get_by_role(Role::TextInput).focus();
     harness.run_steps(2);
-    harness.get_by_role(egui::accesskit::Role::TextInput).type_text("beams");
+    harness.get_by_role(Role::TextInput).type_text("beams");
     harness.run_steps(5);
     assert!(harness.query_by_label("clouds").is_none());
     assert!(harness.state().params().atmosphere.beams);
-    harness.get_by_role(egui::accesskit::Role::CheckBox).click();
+    // The first is that of the automatic exposure.
+    harness.get_all_by_role(Role::CheckBox).nth(1).expect("is found").click();
     harness.run_steps(3);
     assert!(!harness.state().params().atmosphere.beams);
     at_rest(&mut harness);
@@ -79,14 +93,43 @@ fn buttons_go_to_places_and_copy_python() {
     harness.get_by_label("ground").click();
     harness.run_steps(2);
     assert!(harness.state().flight().eye.z < 2.0);
-    harness.get_by_label("Copy as Python").click();
-    harness.step();
-    let copied = harness.output().platform_output.commands.iter().find_map(|command| match command {
-        OutputCommand::CopyText(text) => Some(text.clone()),
-        _ => None,
-    });
-    let code = copied.expect("is copied");
+    let code = copied(&mut harness);
     assert!(code.contains("nubis.Params().with_(") && code.contains("\"sun.elevation\": 28.0"), "{code}");
+}
+
+#[test]
+fn the_automatic_exposure_comes_by_and_by_and_renders_nothing_anew() {
+    let mut harness = window(Start { scene: Some("sunset".into()), ..Start::default() });
+    at_rest(&mut harness);
+    let still =
+        |harness: &Harness<'_, App>| harness.state().shown().expect("is shown").still.clone().expect("is at rest");
+    let exposure = |app: &App| app.shown().expect("is shown").wish.exposure;
+    let before = still(&harness);
+    let wanted = auto_exposure(&before.image, 4, Metering::default()).expect("is allowed") as f32;
+    assert!(wanted.abs() > 0.3, "{wanted}");
+    let first = |harness: &Harness<'_, App>| {
+        harness.get_all_by_role(Role::Slider).next().expect("is there").accesskit_node().is_disabled()
+    };
+    assert!(!first(&harness));
+    harness.get_by_label("auto").click();
+    let mut way = vec![0.0];
+    let started = Instant::now();
+    while way.last() != Some(&wanted) {
+        assert!(started.elapsed() < PATIENCE, "{way:?}, not {wanted}");
+        std::thread::sleep(Duration::from_millis(5));
+        harness.step();
+        way.push(exposure(harness.state()));
+    }
+    assert!(first(&harness));
+    // By steps, none of them back, and never beyond.
+    way.dedup();
+    assert!(way.len() > 2 && way.windows(2).all(|pair| (pair[1] - pair[0]) * wanted > 0.0), "{way:?}");
+    assert!(std::sync::Arc::ptr_eq(&before, &still(&harness)), "is rendered anew");
+    // What moves keeps it, and the lines have it.
+    harness.key_down(Key::W);
+    until(&mut harness, "flight", |app| app.shown().is_some_and(|shown| shown.still.is_none()));
+    assert_eq!(exposure(harness.state()), wanted);
+    assert!(copied(&mut harness).contains(&format!("exposure={wanted:?},")));
 }
 
 #[derive(Debug)]

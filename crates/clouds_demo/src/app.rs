@@ -191,6 +191,11 @@ impl App {
         &self.params
     }
 
+    /// Where the bar between the picture and what is beside it is, as a share of the view.
+    pub fn bar(&self) -> f32 {
+        self.bar
+    }
+
     /// One frame of the window.
     pub fn frame(&mut self, ui: &mut Ui, device: Option<&RenderState>) {
         Self::leave_when_asked(ui);
@@ -502,9 +507,11 @@ impl App {
             let (place, uv) = part(0.0, bar);
             ui.painter().image(texture, place, uv, egui::Color32::WHITE);
         }
-        if let (true, Some(texture)) = (beside, self.texture_beside) {
+        if beside {
             let (place, uv) = part(bar, 1.0);
-            ui.painter().image(texture, place, uv, egui::Color32::WHITE);
+            if let Some(texture) = self.texture_beside {
+                ui.painter().image(texture, place, uv, egui::Color32::WHITE);
+            }
             let line = egui::Rect::from_x_y_ranges(place.left() - 1.0..=place.left() + 1.0, rect.y_range());
             ui.painter().rect_filled(line, 0.0, egui::Color32::WHITE);
             let handle = ui.interact(line.expand(5.0), ui.scope_id().with("bar"), Sense::drag());

@@ -217,8 +217,6 @@ struct Work<'a> {
     moving: Renderer,
     still: Renderer,
     resolution: Resolution,
-    /// When the last moving picture was ready.
-    moved: Option<Instant>,
     /// One is shown while the other is painted.
     screens: [Option<Arc<Screen>>; 2],
     /// The last still.
@@ -231,14 +229,13 @@ struct Work<'a> {
 impl<'a> Work<'a> {
     fn new(gpu: &'a Gpu, adapter: Option<&str>) -> Result<Self> {
         let renderer = || Renderer::new(16, 16, Quality::named("draft")?, adapter);
-        let share = if gpu.info.kind == "cpu" { 0.5 } else { 1.0 };
+        let share = if gpu.info.kind == "cpu" { 0.3 } else { 1.0 };
         let [moving, still] = [renderer()?, renderer()?];
         Ok(Self {
             gpu,
             moving,
             still,
             resolution: Resolution::new(share),
-            moved: None,
             screens: [None, None],
             rested: None,
             map: None,
@@ -289,12 +286,8 @@ impl<'a> Work<'a> {
         let Made { screen, beside, still, metered, timings } = made;
         let took = started.elapsed();
         let map = self.map.as_ref().map(|(_, map)| map.clone());
-        // The window takes its time too, where one processor draws all.
-        let since = self.moved.map_or(took, |moved| moved.elapsed());
-        self.moved = None;
         if let (None, Some(wanted)) = (&still, wish.wanted) {
-            self.resolution.learn(if since < 2 * took + wanted { since } else { took }, wanted);
-            self.moved = Some(Instant::now());
+            self.resolution.learn(took, wanted);
         }
         self.count += 1;
         let (wish, count) = (wish.clone(), self.count);

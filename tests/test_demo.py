@@ -148,22 +148,40 @@ def off(got: np.ndarray, expected: np.ndarray) -> float:
     return float(np.sqrt(((got - expected) ** 2).mean() / (expected**2).mean()))
 
 
+def check_screenshot(
+    path: Path, scale: int, corner: tuple[int, int], view: tuple[int, int]
+) -> None:
+    """The view is the picture of the library, in pixels of the screen."""
+    got = pixels(path)
+    frame = nubis.Renderer(*view).render(*nubis.scenes["fair_weather"])
+    expected = nubis.to_srgb8(frame)[..., :3].astype(np.float64)
+    x, y = corner
+    assert off(got[y : y + view[1], x : x + view[0]], expected) < 0.01
+    # The panel beside it is dark, with bright words.
+    panel = got[y + 12 : y + view[1] - 5, : 350 * scale]
+    assert np.median(panel) < 60 < panel.max()
+
+
 @needs_display
 def test_frames_and_a_screenshot(display, tmp_path):
-    """The view is the picture of the library, and the window leaves by itself."""
+    """The window leaves by itself."""
     arguments = "--frames", "2", "--screenshot", "window.png"
     with Window(display, tmp_path, *arguments) as demo:
         _, errors = demo.process.communicate(timeout=PATIENCE)
         assert demo.process.returncode == 0, errors
-    got = pixels(tmp_path / "window.png")
-    assert got.shape == (720, 1280, 3)
-    frame = nubis.Renderer(*VIEW).render(*nubis.scenes["fair_weather"])
-    expected = nubis.to_srgb8(frame)[..., :3].astype(np.float64)
-    view = got[CORNER[1] : CORNER[1] + VIEW[1], CORNER[0] : CORNER[0] + VIEW[0]]
-    assert off(view, expected) < 0.01
-    # The panel beside it is dark, with bright words.
-    panel = got[60:690, :350]
-    assert np.median(panel) < 60 < panel.max()
+    assert pixels(tmp_path / "window.png").shape == (720, 1280, 3)
+    check_screenshot(tmp_path / "window.png", 1, CORNER, VIEW)
+
+
+@needs_display
+def test_a_screen_of_two_pixels_a_point(display, tmp_path, monkeypatch):
+    monkeypatch.setenv("WINIT_X11_SCALE_FACTOR", "2")
+    arguments = "--size", "640x400", "--frames", "2", "--screenshot", "window.png"
+    with Window(display, tmp_path, *arguments) as demo:
+        _, errors = demo.process.communicate(timeout=PATIENCE)
+        assert demo.process.returncode == 0, errors
+    assert pixels(tmp_path / "window.png").shape == (800, 1280, 3)
+    check_screenshot(tmp_path / "window.png", 2, (720, 188), (560, 562))
 
 
 @needs_display

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from pathlib import Path
 from typing import Any, Literal
@@ -12,7 +11,6 @@ import numpy.typing as npt
 
 from nubis import _nubis
 from nubis._errors import FileError, ParameterError
-from nubis._units import LUMINANCE
 
 
 def to_srgb8(
@@ -70,22 +68,8 @@ def auto_exposure(
         For an array that is no picture, and shares that leave nothing.
     """
     wanted = _nubis.number("key", key)
-    if not 0 < wanted < math.inf:
-        raise ParameterError(f"key = {key!r} is not allowed: it must be a number above 0")
     first, last = _nubis.number("low", low), _nubis.number("high", high)
-    if not 0 <= first < last <= 100:
-        raise ParameterError(
-            f"low = {low!r} is not allowed: it must be from 0 to less than high = {high!r}, which "
-            "must be at most 100"
-        )
-    light = _pixels(frame)[..., :3].astype(np.float64) @ LUMINANCE
-    light = np.sort(np.log2(light[np.isfinite(light) & (light > 0)]))
-    if not light.size:
-        return 0.0
-    start = math.floor(first / 100 * light.size)
-    # One at least is left.
-    end = max(math.ceil(last / 100 * light.size), start + 1)
-    return float(math.log2(wanted) - light[start:end].mean())
+    return _nubis.auto_exposure(_pixels(frame), wanted, first, last)
 
 
 def heat(counts: npt.NDArray[np.uint32], white: int = 1000) -> npt.NDArray[np.uint8]:

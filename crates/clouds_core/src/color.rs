@@ -7,6 +7,9 @@ pub const TONE_MAPS: [&str; 3] = ["agx", "aces", "none"];
 
 type Rgb = [f32; 3];
 
+/// Shares of red, green and blue in the luminance, for Rec. 709 primaries (ITU-R BT.709).
+const LUMINANCE: [f64; 3] = [0.2126, 0.7152, 0.0722];
+
 fn transform(m: &[[f32; 3]; 3], v: Rgb) -> Rgb {
     m.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2])
 }
@@ -77,4 +80,52 @@ pub fn to_srgb8(pixels: &[f32], channels: usize, exposure: f32, tone_map: &str) 
         out.extend(pixel[3..].iter().map(|alpha| byte(alpha.clamp(0.0, 1.0))));
     }
     Ok(out)
+}
+
+/// How [`auto_exposure`] looks at a picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Metering {
+    /// What the mean of the luminance becomes.
+    pub key: f64,
+    /// Percent of the pixels with light, from the darkest on, below which they are left out.
+    pub low: f64,
+    /// That from which on they are.
+    pub high: f64,
+}
+
+impl Default for Metering {
+    /// Middle grey, without the sun's disc and its glare.
+    fn default() -> Self {
+        Self { key: 0.18, low: 5.0, high: 95.0 }
+    }
+}
+
+/// The stops at which the geometric mean of a picture's luminance is the key (Reinhard et al. 2002); 0 where there is no light.
+pub fn auto_exposure(pixels: &[f32], channels: usize, metering: Metering) -> Result<f64> {
+    let Metering { key, low, high } = metering;
+    if !(key > 0.0 && key.is_finite()) {
+        return Err(Error::parameter("key", format!("{key:?}"), "a number above 0"));
+    }
+    if !(0.0 <= low && low < high && high <= 100.0) {
+        let allowed = format!("from 0 to less than high = {high:?}, which must be at most 100");
+        return Err(Error::parameter("low", format!("{low:?}"), allowed));
+    }
+    let luminance = |pixel: &[f32]| pixel.iter().zip(LUMINANCE).map(|(v, share)| f64::from(*v) * share).sum();
+    let mut light: Vec<f64> = pixels.chunks_exact(channels).map(luminance).collect();
+    light.retain(|v| v.is_finite() && *v > 0.0);
+    if light.is_empty() {
+        return Ok(0.0);
+    }
+    let place = |percent: f64| percent / 100.0 * light.len() as f64;
+    let first = place(low).floor() as usize;
+    // One at least is left.
+    let end = (place(high).ceil() as usize).max(first + 1);
+    // What is left out need not be in order.
+    let (_, _, above) = light.select_nth_unstable_by(first, f64::total_cmp);
+    let count = end - first;
+    if count <= above.len() {
+        above.select_nth_unstable_by(count - 1, f64::total_cmp);
+    }
+    let mean = light[first..end].iter().map(|v| v.log2()).sum::<f64>() / count as f64;
+    Ok(key.log2() - mean)
 }

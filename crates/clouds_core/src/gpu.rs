@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::mpsc::{self, RecvTimeoutError};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -152,6 +153,24 @@ pub struct Gpu {
     pub(crate) pipelines: Pipelines,
     nanoseconds_per_tick: Option<f64>,
     failure: Arc<Mutex<Failure>>,
+    waiting: mpsc::Sender<Waiting>,
+}
+
+/// A submission, and who is told when it is done.
+type Waiting = (wgpu::SubmissionIndex, mpsc::Sender<Result<wgpu::PollStatus, wgpu::PollError>>);
+
+/// Waits for submissions, one after the other, for as long as they take: wgpu 30 panics where the time that a wait may take
+/// ends while another thread submits to the same device (gfx-rs/wgpu pull request 9958).
+fn start_waiting(device: wgpu::Device) -> mpsc::Sender<Waiting> {
+    let (sender, receiver) = mpsc::channel::<Waiting>();
+    thread::spawn(move || {
+        for (index, done) in receiver {
+            let poll = wgpu::PollType::Wait { submission_index: Some(index), timeout: None };
+            // Nobody listens where the work was interrupted.
+            let _ = done.send(device.poll(poll));
+        }
+    });
+    sender
 }
 
 /// A kernel that is there, or is being compiled by whoever holds the lock.
@@ -255,6 +274,7 @@ impl Gpu {
             pipelines,
             nanoseconds_per_tick: (!timestamps.is_empty()).then(|| f64::from(queue.get_timestamp_period())),
             failure,
+            waiting: start_waiting(device.clone()),
             device,
             queue,
         })
@@ -462,11 +482,13 @@ impl Gpu {
 
     fn wait(&self, index: wgpu::SubmissionIndex, interrupt: Interrupt<'_>) -> Result<()> {
         let started = Instant::now();
+        let (done, is_done) = mpsc::channel();
+        let ended = || Error::Device("internal error, please report it".into());
+        self.waiting.send((index, done)).map_err(|_| ended())?;
         loop {
-            let poll = wgpu::PollType::Wait { submission_index: Some(index.clone()), timeout: Some(SLICE) };
-            match self.device.poll(poll) {
-                Ok(_) => return self.check(),
-                Err(wgpu::PollError::Timeout) => {
+            match is_done.recv_timeout(SLICE) {
+                Ok(Ok(_)) => return self.check(),
+                Err(RecvTimeoutError::Timeout) => {
                     self.check()?;
                     interrupt()?;
                     if started.elapsed() > HUNG {
@@ -478,7 +500,8 @@ impl Gpu {
                     }
                 }
                 // A lost device says so first.
-                Err(error) => return self.check().and(Err(Error::Device(error.to_string()))),
+                Ok(Err(error)) => return self.check().and(Err(Error::Device(error.to_string()))),
+                Err(RecvTimeoutError::Disconnected) => return self.check().and(Err(ended())),
             }
         }
     }

@@ -1,6 +1,7 @@
 //! The window: one function that reads top to bottom.
 
 use std::collections::VecDeque;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -28,6 +29,12 @@ use crate::weather::WeatherPanel;
 const TURN: f64 = 0.15;
 /// Longest step of the flight, s: after a hitch nobody is elsewhere at once.
 const LONGEST_STEP: f64 = 0.25;
+/// Stops that the slider offers.
+const EXPOSURES: RangeInclusive<f32> = -8.0..=16.0;
+/// The time in which the automatic exposure goes all but a third of its way, s: in half a second it is there but for a twentieth.
+const ADAPTATION: f32 = 0.17;
+/// Stops that nobody sees: the last step of the way.
+const UNSEEN: f32 = 0.01;
 /// Width of the panel, points.
 const PANEL: f32 = 360.0;
 /// Pictures whose costs are plotted.
@@ -70,6 +77,12 @@ pub struct App {
     quality: Quality,
     quality_name: String,
     exposure: f32,
+    /// Whether the exposure is that of the last still.
+    auto: bool,
+    /// What the last still asks for, stops.
+    metered: Option<f32>,
+    /// When the exposure was last moved toward that, while it is on its way.
+    adapted: Option<Instant>,
     tone_map: &'static str,
     sight: Sight,
     rate: f64,
@@ -131,6 +144,9 @@ impl App {
             quality: Quality::named("balanced")?,
             quality_name: "balanced".into(),
             exposure: 0.0,
+            auto: false,
+            metered: None,
+            adapted: None,
             tone_map: TONE_MAPS[0],
             sight: Sight::Picture,
             panel: Panel::default(),
@@ -175,6 +191,11 @@ impl App {
         &self.params
     }
 
+    /// Where the bar between the picture and what is beside it is, as a share of the view.
+    pub fn bar(&self) -> f32 {
+        self.bar
+    }
+
     /// One frame of the window.
     pub fn frame(&mut self, ui: &mut Ui, device: Option<&RenderState>) {
         Self::leave_when_asked(ui);
@@ -186,6 +207,7 @@ impl App {
         egui::Panel::left("panel").resizable(false).exact_size(PANEL).show(ui, |ui| self.settings(ui));
         let view = egui::CentralPanel::no_frame().show(ui, |ui| self.view(ui)).inner;
         self.go_on(ui, &view);
+        self.adapt(ui);
         self.ask(ui, view.rect);
         self.leave_when_done(ui);
     }
@@ -225,6 +247,7 @@ impl App {
         }
         self.intervals.push(self.last_picture.elapsed());
         self.last_picture = Instant::now();
+        self.metered = shown.metered.or(self.metered);
         self.shown = Some(shown);
     }
 
@@ -320,7 +343,9 @@ impl App {
                 self.say(copied, "copied".into());
             }
             ui.separator();
-            ui.add(egui::Slider::new(&mut self.exposure, -8.0..=16.0).suffix(" stops").text("exposure"));
+            let exposure = egui::Slider::new(&mut self.exposure, EXPOSURES).suffix(" stops").text("exposure");
+            ui.add_enabled(!self.auto, exposure);
+            ui.checkbox(&mut self.auto, "auto").on_hover_text("as the last picture at rest asks for");
             ui.add(egui::Slider::new(&mut self.rate, 2.0..=120.0).logarithmic(true).suffix(" Hz").text("wanted"));
         });
     }
@@ -482,9 +507,11 @@ impl App {
             let (place, uv) = part(0.0, bar);
             ui.painter().image(texture, place, uv, egui::Color32::WHITE);
         }
-        if let (true, Some(texture)) = (beside, self.texture_beside) {
+        if beside {
             let (place, uv) = part(bar, 1.0);
-            ui.painter().image(texture, place, uv, egui::Color32::WHITE);
+            if let Some(texture) = self.texture_beside {
+                ui.painter().image(texture, place, uv, egui::Color32::WHITE);
+            }
             let line = egui::Rect::from_x_y_ranges(place.left() - 1.0..=place.left() + 1.0, rect.y_range());
             ui.painter().rect_filled(line, 0.0, egui::Color32::WHITE);
             let handle = ui.interact(line.expand(5.0), ui.scope_id().with("bar"), Sense::drag());
@@ -519,6 +546,26 @@ impl App {
         if controls.is_any() || self.flight.is_falling() || self.playing || sun_moves || weather_changes {
             // The next picture repaints the window. To do it as often as one can would leave a processor that draws both
             // no time for pictures.
+            ui.ctx().request_repaint_after(LONGEST_WAIT);
+        }
+    }
+
+    /// Moves the exposure toward what the last still asks for, as eyes do.
+    fn adapt(&mut self, ui: &Ui) {
+        let Some(metered) = self.metered.filter(|_| self.auto) else {
+            self.adapted = None;
+            return;
+        };
+        let target = metered.clamp(*EXPOSURES.start(), *EXPOSURES.end());
+        let left = target - self.exposure;
+        // The way begins now, however long the window has been at rest, and a hitch is no jump.
+        let waited = self.adapted.replace(Instant::now()).map_or(Duration::ZERO, |last| last.elapsed());
+        let seconds = waited.min(LONGEST_WAIT).as_secs_f32();
+        if left.abs() < UNSEEN {
+            self.exposure = target;
+            self.adapted = None;
+        } else {
+            self.exposure += left * (1.0 - (-seconds / ADAPTATION).exp());
             ui.ctx().request_repaint_after(LONGEST_WAIT);
         }
     }

@@ -153,6 +153,17 @@ mod tests {
     }
 
     #[test]
+    fn the_wheel_sets_the_speed_within_its_range() {
+        let mut flight = north();
+        let mut wheel = |notches| {
+            flight.step(&Controls { wheel: notches, ..Controls::default() }, 1.0);
+            flight.speed
+        };
+        assert_eq!((wheel(2.0), wheel(-2.0)), (156.25, 100.0));
+        assert_eq!((wheel(100.0), wheel(-200.0)), (5000.0, 1.0));
+    }
+
+    #[test]
     fn looking_turns_and_stops_before_the_zenith() {
         let mut flight = north();
         flight.step(&Controls { look: [-90.0, 200.0], ..Controls::default() }, 0.1);

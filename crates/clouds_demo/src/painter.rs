@@ -7,6 +7,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
+use clouds_core::color::Metering;
 use clouds_core::gpu::Timings;
 use clouds_core::params::Weather;
 use clouds_core::renderer::Picture;
@@ -63,6 +64,8 @@ pub struct Shown {
     pub wish: Arc<Wish>,
     /// The whole of a still.
     pub still: Option<Arc<Picture>>,
+    /// Its automatic exposure, stops, where it is one of [`Sight::Picture`].
+    pub metered: Option<f32>,
     /// How long it took.
     pub took: Duration,
     /// Where the time went on the device.
@@ -194,6 +197,16 @@ struct Made {
     screen: Arc<Screen>,
     beside: Option<Arc<Screen>>,
     still: Option<Arc<Picture>>,
+    metered: Option<f32>,
+    timings: Timings,
+}
+
+/// A still that needs no rendering to be shown by another exposure or tone map.
+struct Rested {
+    wish: Wish,
+    picture: Arc<Picture>,
+    beside: Option<Picture>,
+    metered: f32,
     timings: Timings,
 }
 
@@ -204,10 +217,10 @@ struct Work<'a> {
     moving: Renderer,
     still: Renderer,
     resolution: Resolution,
-    /// When the last moving picture was ready.
-    moved: Option<Instant>,
     /// One is shown while the other is painted.
     screens: [Option<Arc<Screen>>; 2],
+    /// The last still.
+    rested: Option<Arc<Rested>>,
     /// The last weather map, and whose it is.
     map: Option<(Weather, Arc<Map>)>,
     count: u64,
@@ -216,15 +229,15 @@ struct Work<'a> {
 impl<'a> Work<'a> {
     fn new(gpu: &'a Gpu, adapter: Option<&str>) -> Result<Self> {
         let renderer = || Renderer::new(16, 16, Quality::named("draft")?, adapter);
-        let share = if gpu.info.kind == "cpu" { 0.5 } else { 1.0 };
+        let share = if gpu.info.kind == "cpu" { 0.3 } else { 1.0 };
         let [moving, still] = [renderer()?, renderer()?];
         Ok(Self {
             gpu,
             moving,
             still,
             resolution: Resolution::new(share),
-            moved: None,
             screens: [None, None],
+            rested: None,
             map: None,
             count: 0,
         })
@@ -236,6 +249,7 @@ impl<'a> Work<'a> {
             let Some((wish, number)) = next(shared, done, None) else { return Ok(()) };
             done = number;
             if mem::take(&mut lock(&shared.inbox).reload) {
+                self.rested = None;
                 self.grant(shared, |work| work.gpu.reload_shaders())?;
             }
             self.grant(shared, |work| work.panorama(shared, &wish))?;
@@ -244,6 +258,7 @@ impl<'a> Work<'a> {
             match next(shared, done, Some(REST)) {
                 None => return Ok(()),
                 Some((_, number)) if number != done => {}
+                Some((wish, _)) if self.rested(&wish).is_some() => {}
                 Some((wish, number)) => self.publish(shared, &wish, number, true)?,
             }
         }
@@ -268,18 +283,15 @@ impl<'a> Work<'a> {
         let started = Instant::now();
         let made = self.grant(shared, |work| work.paint(shared, wish, number, at_rest))?;
         let Some(made) = made else { return Ok(()) };
-        let Made { screen, beside, still, timings } = made;
+        let Made { screen, beside, still, metered, timings } = made;
         let took = started.elapsed();
         let map = self.map.as_ref().map(|(_, map)| map.clone());
-        // The window takes its time too, where one processor draws all.
-        let since = self.moved.map_or(took, |moved| moved.elapsed());
-        self.moved = None;
         if let (None, Some(wanted)) = (&still, wish.wanted) {
-            self.resolution.learn(if since < 2 * took + wanted { since } else { took }, wanted);
-            self.moved = Some(Instant::now());
+            self.resolution.learn(took, wanted);
         }
         self.count += 1;
-        let shown = Shown { screen, beside, wish: wish.clone(), still, took, timings, map, count: self.count };
+        let (wish, count) = (wish.clone(), self.count);
+        let shown = Shown { screen, beside, wish, still, metered, took, timings, map, count };
         lock(&shared.outbox).shown = Some(shown);
         (shared.notify)();
         Ok(())
@@ -292,6 +304,9 @@ impl<'a> Work<'a> {
             let stale = inbox.closed || (at_rest && inbox.number != number);
             if stale { Err(Error::Interrupted) } else { Ok(()) }
         };
+        if let Some(rested) = self.rested(wish) {
+            return self.show_rested(&rested, wish);
+        }
         if at_rest {
             self.look_at_weather(params, &interrupt)?;
         }
@@ -317,7 +332,7 @@ impl<'a> Work<'a> {
         } else {
             self.moving.animate_onto(&screen, camera, params, *time, &interrupt)?;
         }
-        Ok(Made { screen, beside: None, still: None, timings: self.moving.timings.clone() })
+        Ok(Made { screen, beside: None, still: None, metered: None, timings: self.moving.timings.clone() })
     }
 
     /// A still by a method, what it is made of, or how far it is from the truth; and what is wished beside it.
@@ -345,17 +360,41 @@ impl<'a> Work<'a> {
             _ => None,
         };
         let timings = self.still.timings.clone();
+        let picture = Arc::new(picture);
+        if wish.sight == Sight::Picture {
+            let metered = color::auto_exposure(&picture.image, 4, Metering::default())? as f32;
+            let rested = Arc::new(Rested { wish: wish.clone(), picture, beside: other, metered, timings });
+            self.rested = Some(rested.clone());
+            return self.show_rested(&rested, wish);
+        }
         let screen = self.screen(wish, size)?;
         match (wish.sight, truth) {
-            (Sight::Picture, _) => screen.write(self.gpu, &picture.image)?,
             (_, Some(truth)) => screen.write_pixels(self.gpu, &error_pixels(&picture, &truth))?,
             (sight, None) => screen.write_pixels(self.gpu, &pixels_of(sight, &picture))?,
         }
-        let show = |other: Picture| {
-            let screen = Screen::new(self.gpu, size, wish.exposure, wish.tone_map)?;
+        Ok(Made { screen, beside: None, still: Some(picture), metered: None, timings })
+    }
+
+    /// The last still, if it is what is wished for but for its exposure and tone map.
+    fn rested(&self, wish: &Wish) -> Option<Arc<Rested>> {
+        let is_of = |rested: &&Arc<Rested>| {
+            let Wish { exposure, tone_map, .. } = rested.wish;
+            rested.wish == Wish { exposure, tone_map, ..wish.clone() }
+        };
+        self.rested.as_ref().filter(is_of).cloned()
+    }
+
+    /// Shows the last still by the exposure and the tone map that are wished for.
+    fn show_rested(&mut self, rested: &Rested, wish: &Wish) -> Result<Made> {
+        let screen = self.screen(wish, wish.window)?;
+        screen.write(self.gpu, &rested.picture.image)?;
+        let show = |other: &Picture| {
+            let screen = Screen::new(self.gpu, wish.window, wish.exposure, wish.tone_map)?;
             screen.write(self.gpu, &other.image).map(|()| Arc::new(screen))
         };
-        Ok(Made { screen, beside: other.map(show).transpose()?, still: Some(Arc::new(picture)), timings })
+        let beside = rested.beside.as_ref().map(show).transpose()?;
+        let (still, timings) = (Some(rested.picture.clone()), rested.timings.clone());
+        Ok(Made { screen, beside, still, metered: Some(rested.metered), timings })
     }
 
     /// Makes the panorama that is asked for, if one is.

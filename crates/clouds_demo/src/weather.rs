@@ -160,6 +160,17 @@ mod tests {
     }
 
     #[test]
+    fn a_dab_changes_its_own_number_and_comes_back_in_at_the_bottom() {
+        let mut map = grey();
+        Brush { channel: 2, amount: -0.4, radius: 0.125 }.dab(&mut map, [0.5, 0.0]);
+        let at = |x: usize, y: usize| &map.data[(y * 64 + x) * 3..][..3];
+        for (x, y) in [(32, 0), (32, 31)] {
+            assert!(at(x, y)[2] < 0.15, "{:?}", at(x, y));
+        }
+        assert!(map.data.chunks(3).all(|texel| texel[..2] == [0.5, 0.5]));
+    }
+
+    #[test]
     fn dabs_stay_within_the_range() {
         let mut map = grey();
         for _ in 0..10 {

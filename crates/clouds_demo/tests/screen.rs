@@ -1,9 +1,11 @@
 //! What reaches a screen is what reaches memory; and frames whose size changes go on.
 
+mod read;
+
 use std::sync::Arc;
 
 use clouds_core::color::{TONE_MAPS, to_srgb8};
-use clouds_core::{Camera, Gpu, Params, Quality, Renderer, Screen, wgpu};
+use clouds_core::{Camera, Gpu, Params, Quality, Renderer, Screen};
 use clouds_demo::preset;
 use glam::DVec3;
 
@@ -13,28 +15,6 @@ fn adapter() -> Option<String> {
 
 fn renderer(width: u32, height: u32) -> Renderer {
     Renderer::new(width, height, Quality::named("draft").expect("is one"), adapter().as_deref()).expect("opens")
-}
-
-/// The bytes of a screen whose rows are whole multiples of 256 bytes.
-fn read(gpu: &Gpu, screen: &Screen) -> Vec<u8> {
-    let (_, _, device, queue) = gpu.shared();
-    let texture = screen.view().texture();
-    let [width, height] = screen.size();
-    let staging = device.create_buffer(&wgpu::BufferDescriptor {
-        label: None,
-        size: u64::from(4 * width * height),
-        usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-        mapped_at_creation: false,
-    });
-    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-    let layout =
-        wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(4 * width), rows_per_image: Some(height) };
-    let target = wgpu::TexelCopyBufferInfo { buffer: &staging, layout };
-    encoder.copy_texture_to_buffer(texture.as_image_copy(), target, texture.size());
-    queue.submit([encoder.finish()]);
-    staging.map_async(wgpu::MapMode::Read, .., |_| {});
-    device.poll(wgpu::PollType::wait_indefinitely()).expect("is done");
-    staging.get_mapped_range(..).expect("is mapped").to_vec()
 }
 
 fn shot(i: u32) -> (Camera, Params, f64) {
@@ -54,7 +34,7 @@ fn a_screen_shows_what_memory_gets() {
             one.animate_onto(&screen, &camera, &params, time, &|| Ok(())).expect("is painted");
             let image = other.animate(&camera, &params, time, true, None, &|| Ok(())).expect("is made");
             let expected = to_srgb8(&image, 4, exposure, tone_map).expect("is shown");
-            let got = read(&gpu, &screen);
+            let got = read::bytes(&gpu, &screen);
             let most = got.iter().zip(&expected).map(|(a, b)| a.abs_diff(*b)).max();
             assert!(most <= Some(1), "{tone_map}, frame {i}: {most:?} levels");
             assert!(got.iter().any(|v| *v > 100) && got.chunks(4).any(|p| p[2] > p[0]));

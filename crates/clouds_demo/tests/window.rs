@@ -1,21 +1,44 @@
 //! The window without a window: its panels are driven as by a user, its pictures come from whatever adapter there is.
 
+mod read;
+
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use clouds_core::Gpu;
+use clouds_core::color::{Metering, auto_exposure};
+use clouds_core::params::Model;
+use clouds_core::{Gpu, Screen};
 use clouds_demo::app::{App, Start};
-use eframe::egui::{self, Key, OutputCommand};
+use clouds_demo::painter::Shown;
+use clouds_demo::sight::Sight;
+use eframe::egui::accesskit::Role;
+use eframe::egui::{self, Key, OutputCommand, Pos2, Vec2};
 use egui_kittest::Harness;
-use egui_kittest::kittest::Queryable as _;
+use egui_kittest::kittest::{NodeT as _, Queryable as _};
 
 /// How long a picture may take on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(60);
 
+fn gpu() -> Arc<Gpu> {
+    Gpu::open(std::env::var("NUBIS_ADAPTER").ok().as_deref()).expect("there is an adapter")
+}
+
 fn window(start: Start) -> Harness<'static, App> {
-    let gpu = Gpu::open(std::env::var("NUBIS_ADAPTER").ok().as_deref()).expect("there is an adapter");
-    let app = App::new(&egui::Context::default(), gpu, start).expect("starts");
-    Harness::builder().with_size([500.0, 400.0]).build_ui_state(|ui, app: &mut App| app.frame(ui, None), app)
+    scaled_window(start, 1.0)
+}
+
+/// Points around the window, which are the harness's.
+const MARGIN: f32 = 8.0;
+/// Points of the panel on the left.
+const PANEL: f32 = 360.0;
+
+/// 500 x 400 points, of which the view has the right 140.
+fn scaled_window(start: Start, pixels_per_point: f32) -> Harness<'static, App> {
+    let app = App::new(&egui::Context::default(), gpu(), start).expect("starts");
+    let size = Vec2::new(500.0, 400.0) + Vec2::splat(2.0 * MARGIN);
+    let builder = Harness::builder().with_size(size).with_pixels_per_point(pixels_per_point);
+    builder.build_ui_state(|ui, app: &mut App| app.frame(ui, None), app)
 }
 
 /// Steps until something is so.
@@ -33,6 +56,17 @@ fn at_rest(harness: &mut Harness<'_, App>) {
     until(harness, "a picture at rest", |app| {
         app.shown().is_some_and(|shown| shown.still.is_some() && shown.wish.params == *app.params())
     });
+}
+
+/// What is copied as Python.
+fn copied(harness: &mut Harness<'_, App>) -> String {
+    harness.get_by_label("Copy as Python").click();
+    harness.step();
+    let copied = harness.output().platform_output.commands.iter().find_map(|command| match command {
+        OutputCommand::CopyText(text) => Some(text.clone()),
+        _ => None,
+    });
+    copied.expect("is copied")
 }
 
 #[test]
@@ -57,13 +91,14 @@ fn the_search_leaves_the_fields_that_are_meant_and_they_change_the_sky() {
     let mut harness = window(Start::default());
     harness.run_steps(2);
     assert!(harness.query_by_label("clouds").is_some());
-    harness.get_by_role(egui::accesskit::Role::TextInput).focus();
+    harness.get_by_role(Role::TextInput).focus();
     harness.run_steps(2);
-    harness.get_by_role(egui::accesskit::Role::TextInput).type_text("beams");
+    harness.get_by_role(Role::TextInput).type_text("beams");
     harness.run_steps(5);
     assert!(harness.query_by_label("clouds").is_none());
     assert!(harness.state().params().atmosphere.beams);
-    harness.get_by_role(egui::accesskit::Role::CheckBox).click();
+    // The first is that of the automatic exposure.
+    harness.get_all_by_role(Role::CheckBox).nth(1).expect("is found").click();
     harness.run_steps(3);
     assert!(!harness.state().params().atmosphere.beams);
     at_rest(&mut harness);
@@ -79,14 +114,169 @@ fn buttons_go_to_places_and_copy_python() {
     harness.get_by_label("ground").click();
     harness.run_steps(2);
     assert!(harness.state().flight().eye.z < 2.0);
-    harness.get_by_label("Copy as Python").click();
-    harness.step();
-    let copied = harness.output().platform_output.commands.iter().find_map(|command| match command {
-        OutputCommand::CopyText(text) => Some(text.clone()),
-        _ => None,
-    });
-    let code = copied.expect("is copied");
+    let code = copied(&mut harness);
     assert!(code.contains("nubis.Params().with_(") && code.contains("\"sun.elevation\": 28.0"), "{code}");
+}
+
+#[test]
+fn the_automatic_exposure_comes_by_and_by_and_renders_nothing_anew() {
+    let mut harness = window(Start { scene: Some("sunset".into()), ..Start::default() });
+    at_rest(&mut harness);
+    let still =
+        |harness: &Harness<'_, App>| harness.state().shown().expect("is shown").still.clone().expect("is at rest");
+    let exposure = |app: &App| app.shown().expect("is shown").wish.exposure;
+    let before = still(&harness);
+    let wanted = auto_exposure(&before.image, 4, Metering::default()).expect("is allowed") as f32;
+    assert!(wanted.abs() > 0.3, "{wanted}");
+    let first = |harness: &Harness<'_, App>| {
+        harness.get_all_by_role(Role::Slider).next().expect("is there").accesskit_node().is_disabled()
+    };
+    assert!(!first(&harness));
+    harness.get_by_label("auto").click();
+    let mut way = vec![0.0];
+    let started = Instant::now();
+    while way.last() != Some(&wanted) {
+        assert!(started.elapsed() < PATIENCE, "{way:?}, not {wanted}");
+        std::thread::sleep(Duration::from_millis(5));
+        harness.step();
+        way.push(exposure(harness.state()));
+    }
+    assert!(first(&harness));
+    // By steps, none of them back, and never beyond.
+    way.dedup();
+    assert!(way.len() > 2 && way.windows(2).all(|pair| (pair[1] - pair[0]) * wanted > 0.0), "{way:?}");
+    assert!(Arc::ptr_eq(&before, &still(&harness)), "is rendered anew");
+    // What moves keeps it, and the lines have it.
+    harness.key_down(Key::W);
+    until(&mut harness, "flight", |app| app.shown().is_some_and(|shown| shown.still.is_none()));
+    assert_eq!(exposure(harness.state()), wanted);
+    assert!(copied(&mut harness).contains(&format!("exposure={wanted:?},")));
+}
+
+/// Chooses from a menu.
+fn choose(harness: &mut Harness<'_, App>, menu: &str, choice: &str) {
+    harness.get_by_role_and_label(Role::ComboBox, menu).click();
+    harness.run_steps(3);
+    harness.get_by_label(choice).click();
+    harness.run_steps(3);
+}
+
+/// Moves the pointer with its button down.
+fn drag(harness: &mut Harness<'_, App>, from: Pos2, by: Vec2) {
+    harness.hover_at(from);
+    harness.step();
+    harness.drag_at(from);
+    harness.step();
+    // The first points only tell a drag from a click.
+    for share in [0.5, 0.75, 1.0] {
+        harness.hover_at(from + share * by);
+        harness.step();
+    }
+    harness.drop_at(from + by);
+    harness.step();
+}
+
+/// The pixels of what is shown, and of what is beside it.
+fn shown_pixels(harness: &Harness<'_, App>) -> (Vec<u8>, Option<Vec<u8>>) {
+    let shown = harness.state().shown().expect("is shown");
+    let pixels = |screen: &Arc<Screen>| read::bytes(&gpu(), screen);
+    (pixels(&shown.screen), shown.beside.as_ref().map(pixels))
+}
+
+#[test]
+fn two_pixels_a_point_are_twice_the_picture_and_the_same_hands() {
+    let mut sizes = Vec::new();
+    for scale in [1.0, 2.0] {
+        let mut harness = scaled_window(Start::default(), scale);
+        at_rest(&mut harness);
+        let shown = harness.state().shown().expect("is shown");
+        assert_eq!(shown.screen.size(), shown.wish.window);
+        sizes.push(shown.wish.window.map(|side| side as f32 / scale));
+        let before = *harness.state().flight();
+        drag(&mut harness, Pos2::new(450.0, 200.0), Vec2::new(-40.0, 0.0));
+        // 0.15 degrees a point.
+        let turned = harness.state().flight().azimuth - before.azimuth;
+        assert!((turned - 6.0).abs() < 1e-3, "{turned} degrees at {scale}");
+        choose(&mut harness, "beside", "light single");
+        until(&mut harness, "two pictures", |app| app.shown().is_some_and(|shown| shown.beside.is_some()));
+        drag(&mut harness, Pos2::new(MARGIN + PANEL + 70.0, 200.0), Vec2::new(28.0, 0.0));
+        let bar = harness.state().bar();
+        assert!((bar - 0.7).abs() < 1e-3, "{bar} at {scale}");
+        assert_eq!(harness.state().flight().azimuth, before.azimuth + turned);
+    }
+    assert!(sizes[0][0] == 140.0 && sizes[1][0] == 140.0 && (sizes[0][1] - sizes[1][1]).abs() <= 1.0, "{sizes:?}");
+}
+
+#[test]
+fn another_light_model_is_beside_the_picture_at_rest() {
+    let mut harness = window(Start::default());
+    at_rest(&mut harness);
+    assert_eq!(shown_pixels(&harness).1, None);
+    let own = harness.state().params().light.model;
+    let mut beside = |name: &str, model: Model| {
+        choose(&mut harness, "beside", name);
+        until(&mut harness, name, |app| {
+            let is_there = |shown: &Shown| shown.wish.beside.as_ref().is_some_and(|(sky, _)| sky.light.model == model);
+            app.shown().is_some_and(|shown| shown.beside.is_some() && is_there(shown))
+        });
+        let (picture, other) = shown_pixels(&harness);
+        (picture, other.expect("is beside it"))
+    };
+    let (picture, other) = beside("light single", Model::Single);
+    let differ = picture.iter().zip(&other).filter(|(a, b)| a.abs_diff(**b) > 8).count();
+    assert!(differ > picture.len() / 20, "{differ} of {}", picture.len());
+    // The method of the picture itself.
+    let (picture, other) = beside("balanced", own);
+    assert!(picture == other);
+}
+
+#[test]
+fn the_error_is_black_where_there_is_none() {
+    let mut harness = window(Start::default());
+    harness.run_steps(2);
+    choose(&mut harness, "shown", "error");
+    let error_at_rest = |harness: &mut Harness<'_, App>| {
+        until(harness, "the error in a quarter of the pixels", |app| {
+            let is_of = |shown: &Shown| shown.wish.sight == Sight::Error && shown.wish.params == *app.params();
+            let is_whole = |shown: &Shown| shown.screen.size() == shown.wish.window.map(|side| side / 4);
+            app.shown().is_some_and(|shown| is_of(shown) && is_whole(shown))
+        });
+    };
+    error_at_rest(&mut harness);
+    let bright = |harness: &Harness<'_, App>| shown_pixels(harness).0.chunks(4).filter(|p| p[0] > 8).count();
+    let some = bright(&harness);
+    assert!(some > 50, "{some}");
+    drop_file(&mut harness, "clear", "[clouds]\ncoverage = 0.0\n");
+    error_at_rest(&mut harness);
+    assert_eq!(bright(&harness), 0);
+}
+
+#[test]
+fn windows_of_any_size_have_pictures_of_it_and_of_none_the_last() {
+    let mut harness = window(Start::default());
+    at_rest(&mut harness);
+    let resize = |harness: &mut Harness<'_, App>, width: f32| {
+        harness.set_size(Vec2::new(width, 300.0));
+        until(harness, "another size", |app| {
+            let size = |shown: &Shown| shown.still.as_ref().map(|_| shown.screen.size()[0]);
+            app.shown().and_then(size) == Some((width - 2.0 * MARGIN - PANEL) as u32)
+        });
+    };
+    resize(&mut harness, 700.0);
+    resize(&mut harness, 400.0);
+    let before = harness.state().shown().expect("is shown").wish.window;
+    harness.key_down(Key::W);
+    for size in [[360.0, 300.0], [0.0, 0.0], [1.0, 1.0], [400.0, 40.0]] {
+        harness.set_size(size.into());
+        for _ in 0..5 {
+            std::thread::sleep(Duration::from_millis(20));
+            harness.step();
+        }
+        let wish = &harness.state().shown().expect("is shown").wish;
+        assert_eq!(wish.window, before, "{size:?}");
+    }
+    harness.key_up(Key::W);
+    resize(&mut harness, 500.0);
 }
 
 #[derive(Debug)]
@@ -105,7 +295,7 @@ impl egui::DroppedFile for Dropped {
 fn drop_file(harness: &mut Harness<'_, App>, name: &str, text: &str) {
     let path: PathBuf = std::env::temp_dir().join(format!("{}-{name}.toml", std::process::id()));
     std::fs::write(&path, text).expect("can be written");
-    harness.input_mut().dropped_files = vec![std::sync::Arc::new(Dropped(path.clone()))];
+    harness.input_mut().dropped_files = vec![Arc::new(Dropped(path.clone()))];
     harness.step();
     harness.step();
     std::fs::remove_file(path).expect("was written");
@@ -125,8 +315,7 @@ fn dropped_skies_are_read_or_refused_by_the_field() {
 
 #[test]
 fn scenes_that_do_not_exist_are_refused() {
-    let gpu = Gpu::open(std::env::var("NUBIS_ADAPTER").ok().as_deref()).expect("there is an adapter");
     let start = Start { scene: Some("sunst".into()), ..Start::default() };
-    let error = App::new(&egui::Context::default(), gpu, start).err().expect("is no scene");
+    let error = App::new(&egui::Context::default(), gpu(), start).err().expect("is no scene");
     assert!(error.to_string().contains("fair_weather"), "{error}");
 }

@@ -655,6 +655,12 @@ fn to_srgb8<'py>(
 }
 
 #[pyfunction]
+fn auto_exposure(py: Python<'_>, frame: PyReadonlyArrayDyn<'_, f32>, key: f64, low: f64, high: f64) -> PyResult<f64> {
+    let channels = frame.shape()[2];
+    raise(py, color::auto_exposure(frame.as_slice()?, channels, color::Metering { key, low, high }))
+}
+
+#[pyfunction]
 fn write_png(py: Python<'_>, path: PathBuf, frame: PyReadonlyArrayDyn<'_, u8>) -> PyResult<()> {
     let shape = frame.shape();
     raise(py, files::write_png(&path, frame.as_slice()?, [shape[1], shape[0]], shape[2]))
@@ -694,7 +700,7 @@ fn clear_cache(py: Python<'_>) -> PyResult<()> {
 mod _nubis {
     #[pymodule_export]
     use super::{
-        Camera, DensityGrid, Renderer, adapters, cache_usage, check, check_params, check_quality, clear_cache, number,
-        quality, read_pixels, to_srgb8, write_exr, write_hdr, write_png,
+        Camera, DensityGrid, Renderer, adapters, auto_exposure, cache_usage, check, check_params, check_quality,
+        clear_cache, number, quality, read_pixels, to_srgb8, write_exr, write_hdr, write_png,
     };
 }

@@ -252,6 +252,24 @@ fn the_error_is_black_where_there_is_none() {
 }
 
 #[test]
+fn what_a_turn_brings_into_the_picture_has_no_history() {
+    let mut harness = window(Start::default());
+    at_rest(&mut harness);
+    choose(&mut harness, "shown", "history length");
+    let has_history = |app: &App| app.shown().is_some_and(|shown| shown.wish.sight == Sight::History);
+    until(&mut harness, "a history", has_history);
+    let dark = |harness: &Harness<'_, App>| shown_pixels(harness).0.chunks(4).filter(|p| p[1] < 8).count();
+    assert_eq!(dark(&harness), 0);
+    let before = harness.state().flight().azimuth;
+    drag(&mut harness, Pos2::new(450.0, 200.0), Vec2::new(-60.0, 0.0));
+    assert!(harness.state().flight().azimuth != before);
+    until(&mut harness, "another history", |app| {
+        app.shown().is_some_and(|shown| app.flight().camera().is_ok_and(|camera| camera == shown.wish.camera))
+    });
+    assert!(dark(&harness) > 10, "{}", dark(&harness));
+}
+
+#[test]
 fn windows_of_any_size_have_pictures_of_it_and_of_none_the_last() {
     let mut harness = window(Start::default());
     at_rest(&mut harness);

@@ -914,7 +914,7 @@ impl World {
         bindings.extend(sun_volume);
         let ground_shadow = self.ground_shadow.run(&mut ctx, params, frame, at, &bindings)?; // as those, where it is seen
         bindings.extend(ground_shadow);
-        let beams = self.beams.run(&mut ctx, params, frame, at.0, &bindings)?; // as those and the view, where they shade air
+        let beams = self.beams.run(&mut ctx, params, frame, at, &bindings)?; // as those and the view, where they shade air
         bindings.extend(beams);
         bindings.extend(self.scene_depth.bindings());
         let held = bindings.iter().filter(|(_, binding)| !matches!(binding, Binding::Sampler(_)));

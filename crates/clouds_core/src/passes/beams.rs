@@ -3,8 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use super::sky::near;
-use super::sun_volume::{Shadows, shadows};
-use super::{Baked, Bindings, Context};
+use super::{Baked, Bindings, Context, shadow};
 use crate::error::Result;
 use crate::frame::Frame;
 use crate::kernel::{Variant, Wanted};
@@ -21,8 +20,8 @@ const SLICES: u32 = 32;
 const STEP: f64 = 16.0;
 
 /// What the volume is made from: its size, the camera's axes, its fields of view and the sky's scale, sun, air and shadows, from
-/// where, and where the shadows are.
-type Key = ([u32; 3], [[f32; 3]; 3], [f32; 3], params::Sun, params::Atmosphere, Shadows, [f64; 3], [f64; 2]);
+/// where, and where those are.
+type Key = ([u32; 3], [[f32; 3]; 3], [f32; 3], params::Sun, params::Atmosphere, shadow::Key, [f64; 3], [f64; 2]);
 
 /// The volume on the GPU.
 pub(crate) struct Beams {
@@ -56,21 +55,21 @@ impl Beams {
         ctx: &mut Context<'_>,
         params: &Params,
         frame: &Frame,
-        eye: DVec3,
+        at: (DVec3, f64),
         world: &Bindings<'_>,
     ) -> Result<Bindings<'_>> {
         let size = size(frame);
         let axes = [frame.right, frame.up, frame.forward];
         let scales = [frame.tan_half_fov, frame.half_fov, frame.sky_scale];
-        let from = near(eye, params, STEP);
-        let shadow = DVec2::from_array(frame.shadow_eye.map(f64::from)) + from.truncate() - eye.truncate();
-        let shadow = ((shadow / STEP).round() * STEP).to_array();
-        let (sun, air) = (params.sun.clone(), params.atmosphere.clone());
-        let key = (size, axes, scales, sun, air, shadows(params), from.to_array(), shadow);
+        let from = near(at.0, params, STEP);
+        let place = DVec2::from_array(frame.shadow_eye.map(f64::from)) + from.truncate() - at.0.truncate();
+        let place = ((place / STEP).round() * STEP).to_array();
+        let (sun, air, shadows) = (params.sun.clone(), params.atmosphere.clone(), shadow::key(params, frame, at));
+        let key = (size, axes, scales, sun, air, shadows, from.to_array(), place);
         let view = self.made.get(key, || {
             let view = ctx.gpu.texture_3d("beams", size).create_view(&wgpu::TextureViewDescriptor::default());
             if let Some((pass, entry, variant)) = kernel(ctx.variant) {
-                let mut there = Frame { shadow_eye: shadow.map(|v| v as f32), ..frame.clone() };
+                let mut there = Frame { shadow_eye: place.map(|v| v as f32), ..frame.clone() };
                 there.set_planet(from, params);
                 ctx.uniforms.upload_frame(ctx.gpu, &there);
                 let bindings = [world.as_slice(), &[("volume_out", (&view).into())]].concat();

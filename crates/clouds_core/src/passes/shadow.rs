@@ -29,7 +29,14 @@ const CLOUD_STEP: f64 = 32.0;
 
 /// What the shadows are made from: whether they are wanted, sun, clouds, weather, wind, planet and grid, and for where, how
 /// fine and when.
-type Key = (bool, Shadows, (f32, usize), [i64; 3], f32);
+pub(crate) type Key = (bool, Shadows, (f32, usize), [i64; 3], f32);
+
+/// The same for a picture.
+pub(crate) fn key(params: &Params, frame: &Frame, (eye, time): (DVec3, f64)) -> Key {
+    let grid = params.volume.as_ref().map_or(0, |grid| Arc::as_ptr(grid) as usize);
+    let planet = (params.atmosphere.planet_radius, grid);
+    (wanted(frame), shadows(params), planet, origin(eye, params, time).steps, frame.shadow_texel)
+}
 
 /// The levels on the GPU.
 pub(crate) struct GroundShadow {
@@ -90,10 +97,7 @@ impl GroundShadow {
     ) -> Result<Bindings<'_>> {
         let wanted = wanted(frame);
         let origin = origin(eye, params, time);
-        let grid = params.volume.as_ref().map_or(0, |grid| Arc::as_ptr(grid) as usize);
-        let planet = (params.atmosphere.planet_radius, grid);
-        let key = (wanted, shadows(params), planet, origin.steps, frame.shadow_texel);
-        let view = self.made.get(key, || {
+        let view = self.made.get(key(params, frame, (eye, time)), || {
             let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
             let size = if wanted { [SIDE, SIDE * LEVELS, 1] } else { [1; 3] };
             let [single, mean, levels] = [("", size), ("ground_shadow_mean", [1; 3]), ("ground_shadow", size)]

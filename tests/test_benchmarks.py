@@ -422,8 +422,8 @@ def test_memory(sun_volume):
     assert scene["sun_volume"] == (8 * 96 * 96 * 144 if sun_volume else 8)
     bytes_a_pixel = {"clouds": 16, "image": 16, "sky": 16, "cloud_span": 8}
     bytes_a_pixel |= {n: 4 for n in ("cloud_depth", "samples", "active_rays", "depth")}
-    # Corners of cells of 4 x 4 pixels, and one more around them all: two times four numbers each.
-    few = {"ray_count": 16, "corners": 32 * (96 // 4 + 3) * (56 // 4 + 3)}
+    # Corners of cells of 4 x 4 pixels, and one more around them all: four times four numbers each.
+    few = {"ray_count": 16, "corners": 64 * (96 // 4 + 3) * (56 // 4 + 3)}
     assert still == {n: 96 * 54 * b for n, b in bytes_a_pixel.items()} | few
     bigger = nubis.Renderer(192, 108, quality=quality)
     bigger.render(*FAIR)

@@ -93,6 +93,33 @@ def test_shadows_and_beams_behind_clouds(scene):
     assert np.quantile(error / full["sky"].max(axis=-1), 0.999) < 0.02
 
 
+#: Share of a picture that is between the corners of cells.
+BETWEEN = 15.0 / 16.0
+
+
+@pytest.mark.parametrize("elevation", [45.0, 8.0])
+def test_fine_high_clouds(elevation):
+    """Where cells are wider than streaks, those are worked out at each pixel, the air is not."""
+    params = CIRRUS.with_(**{"sun.elevation": elevation, "high_clouds.emboss": 0.5})
+    full, few = both(looking(0.0, 6.0, 6.0), params)
+    assert full["transmittance"].std() > 0.1
+    np.testing.assert_allclose(few["transmittance"], full["transmittance"], rtol=1e-5)
+    error = np.abs(picture(few) - picture(full)).max(axis=-1) / picture(full).max(axis=-1)
+    assert error.max() < 0.005
+    assert 0.5 < np.mean(error > 1e-7) <= BETWEEN
+
+
+def test_fine_shadows():
+    """The same of shadows on the ground."""
+    params = FAIR.with_(**{"high_clouds.coverage": 0.9, "high_clouds.optical_depth": 3.0})
+    full, few = both(looking(0.0, -3.0, 8.0), params)
+    bright = full["sky"].max(axis=-1)
+    assert np.quantile(bright, 0.95) > 1.5 * np.quantile(bright, 0.05)
+    error = np.abs(few["sky"] - full["sky"]).max(axis=-1) / bright
+    assert error.max() < 0.01
+    assert 0.5 < np.mean(error > 1e-7) <= BETWEEN
+
+
 @pytest.mark.parametrize("haze", [1.0, 12.0])
 @pytest.mark.parametrize("pitch", [0.0, 1.3, -2.05])
 def test_the_horizon_is_sharp(haze, pitch):

@@ -72,9 +72,11 @@ override LIGHT_CHEAP: bool = true; // there are light samples that do not
 @group(0) @binding(16) var<storage, read_write> sky: array<vec4f>; // radiance without clouds
 @group(0) @binding(29) var<storage, read_write> depth: array<f32>; // of all clouds together, -1 where none
 
-// What is behind the marched clouds at the corners of cells (passes/composite): the high clouds as `clouds`, and the
-// radiance of sky and ground with the distance of those times their opacity, m; that less than 0 on the ground.
-@group(0) @binding(55) var<storage, read_write> corners: array<mat2x4f>;
+// What is behind the marched clouds at the corners of cells (passes/composite): the high clouds as `clouds`; the radiance
+// behind them, with their distance times their opacity, m; transmittance of the air before them, with the brightness of
+// all together; radiance of that air, with the brightness behind them. On the ground, where the distance is less than 0, the
+// same of shadows: the light they lack as radiance, the ground without them, and what one of no sun at all would lack.
+@group(0) @binding(55) var<storage, read_write> corners: array<mat4x4f>;
 
 // Temporal reprojection: the marched subset, and the frame before.
 @group(0) @binding(17) var<storage, read_write> fresh: array<vec4f>;

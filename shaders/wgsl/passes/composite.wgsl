@@ -26,13 +26,16 @@ const HIGH_FADE = 100.0;
 
 // Pixels of a cell in each direction (as in composite.rs).
 const TILE = 4u;
-// Second difference of radiance and transmittance between corners of cells past which each pixel of a cell is worked out: as a
-// share of the contrast past which clouds are marched, of the brightest corner. What is smooth errs by an eighth of it.
-const CURVATURE = 0.1;
+// Second difference between corners of cells past which each pixel of a cell is worked out, as a share of the contrast past
+// which clouds are marched, of the brightest corner: of brightness, of the transmittance of the high clouds, and of the
+// brightness behind those, which in wide smooth gradients errs the same way for many pixels. What is smooth errs by an
+// eighth of it.
+const CURVATURE = vec3f(0.1, 0.1, 0.05);
 // Most of the high clouds between corners, in tiles of their texture, and of shadows on the ground, in their texels.
 const FIBRE = 0.02;
 const SHADOW_EDGE = 2.0;
-// What stands for the distance of high clouds where a cell may hide an edge, m.
+// What stands for the distance of high clouds where a cell is wider than what they vary by, and where it may hide an edge, m.
+const FINE = 1e20;
 const EDGE = 1e30;
 
 // Luminance of Rec. 709 red, green and blue.
@@ -88,8 +91,9 @@ fn put(index: u32, sight: Sight) {
     image[index] = select(vec4f(sight.seen.radiance, 1.0 - sight.seen.transmittance), whole, frame.background > 0u);
 }
 
-// What is behind the marched clouds is smooth nearly everywhere: it is worked out at the corners of cells, and between them
-// where it bends.
+// What is behind the marched clouds is smooth nearly everywhere, and is worked out at the corners of cells. Most of what
+// bends between them are high clouds and the shadows on the ground: in fine cells those are worked out at each pixel, and sky,
+// ground and air between the corners. Where these bend too, or may have an edge, a pixel is worked out as a whole.
 
 fn cell_columns() -> u32 {
     return (frame.width + TILE - 1u) / TILE;
@@ -110,32 +114,49 @@ fn backdrop(@builtin(global_invocation_id) id: vec3u) {
     let view = view_direction(pixel + 0.5);
     let sight = sight_of(view.xyz, vec2u(0u, frame.sheet_row), NO_SCENE, Layer(vec3f(0.0), 1.0, 0.0));
     let ground = hit_sphere(view.xyz, frame.power_ground);
-    var distance = select(sight.seen.distance, -1.0 - sight.seen.distance, ground.enters);
-    if view.w == 0.0 || hides_edge(view.xyz, ground) {
+    var layer = vec4f(sight.seen.radiance, sight.seen.transmittance);
+    var distance = sight.seen.distance;
+    var air = sight.high_air;
+    if ground.enters {
+        layer = vec4f(-sight.shadow, 1.0);
+        air = Air(sight.sunlight, vec3f(0.0));
+    }
+    if is_fine(view.xyz, ground) {
+        distance = FINE;
+    }
+    distance = select(distance, -1.0 - distance, ground.enters);
+    // The sun's disc is smaller than a cell.
+    let near_sun = SUN_RADIUS + f32(2u * TILE) * pixel_width();
+    if view.w == 0.0 || one_minus_cos(view.xyz, frame.sun_direction) < 0.5 * near_sun * near_sun {
         distance = EDGE;
     }
-    let high = vec4f(sight.seen.radiance, sight.seen.transmittance);
-    corners[corner_index(id.xy)] = mat2x4f(high, vec4f(sight.background, distance));
+    let behind = vec4f(sight.background + sight.shadow, distance);
+    const MEAN = vec3f(1.0 / 3.0);
+    corners[corner_index(id.xy)] = mat4x4f(
+        layer,
+        behind,
+        vec4f(air.transmittance, dot(layer.rgb + layer.a * behind.rgb, MEAN)),
+        vec4f(air.radiance, dot(behind.rgb, MEAN)),
+    );
 }
 
-// Whether corners so far apart may miss an edge between them: the sun's disc, and, toward the horizon, high clouds and shadows.
-fn hides_edge(direction: vec3f, ground: Hit) -> bool {
-    let near_sun = SUN_RADIUS + f32(2u * TILE) * pixel_width();
-    var hides = one_minus_cos(direction, frame.sun_direction) < 0.5 * near_sun * near_sun;
+// Whether corners so far apart may miss high clouds, or shadows on the ground, between them.
+fn is_fine(direction: vec3f, ground: Hit) -> bool {
+    var fine = false;
     if HIGH {
         let far = hit_sphere(direction, frame.power_high).far;
         let across = cell_across(direction, far, params.high_clouds.altitude);
-        hides = hides || (!ground.enters && across > FIBRE * params.high_clouds.scale);
+        fine = !ground.enters && across > FIBRE * params.high_clouds.scale;
     }
     if GROUND_SHADOW {
         let q = ground.near * direction.xy + frame.shadow_eye;
-        var fine = SHADOW_EDGE * shadow_texel(shadow_level(q, 0.0));
+        var most = SHADOW_EDGE * shadow_texel(shadow_level(q, 0.0));
         if HIGH {
-            fine = min(fine, FIBRE * params.high_clouds.scale);
+            most = min(most, FIBRE * params.high_clouds.scale);
         }
-        hides = hides || (ground.enters && cell_across(direction, ground.near, 0.0) > fine);
+        fine = fine || (ground.enters && cell_across(direction, ground.near, 0.0) > most);
     }
-    return hides;
+    return fine;
 }
 
 // How far a cell reaches along a sphere that its ray meets at a distance, m.
@@ -152,92 +173,171 @@ fn composite_cells(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let first = vec2u(id.x * TILE, frame.sheet_row + id.y * TILE);
-    var high: mat4x4f; // of the four corners
-    var behind: mat4x4f;
-    var bend = vec4f(0.0);
-    var brightest = 0.0;
-    var nearest = EDGE;
-    var farthest = -EDGE;
-    // It shows at the corners of the cells around too: high clouds near the horizon are lower than a cell.
-    var before: mat4x4f;
-    var earlier: mat4x4f;
-    var k = 0u;
-    loop {
-        var row: mat4x4f;
-        for (var j = 0u; j < 4u; j++) {
-            let both = corners[corner_index(id.xy + vec2u(j, k))];
-            let layer = both[0];
-            let sky = both[1];
-            row[j] = vec4f(layer.rgb + layer.a * sky.rgb, layer.a);
-            brightest = max(brightest, max(max(row[j].r, row[j].g), row[j].b));
-            if (j == 1u || j == 2u) && (k == 1u || k == 2u) {
-                let corner = 2u * (k - 1u) + j - 1u;
-                high[corner] = layer;
-                behind[corner] = sky;
-                nearest = min(nearest, sky.a);
-                farthest = max(farthest, sky.a);
-            }
-        }
-        bend = max(bend, max(abs(row[0] - 2.0 * row[1] + row[2]), abs(row[1] - 2.0 * row[2] + row[3])));
-        if k >= 2u {
-            for (var j = 0u; j < 4u; j++) {
-                bend = max(bend, abs(row[j] - 2.0 * before[j] + earlier[j]));
-            }
-        }
-        if k == 3u {
-            break;
-        }
-        earlier = before;
-        before = row;
-        k++;
-    }
+    // Written out: lavapipe keeps in memory what a loop indexes.
+    let c0 = corner_index(id.xy + 1u);
+    let c1 = c0 + 1u;
+    let c2 = corner_index(id.xy + vec2u(1u, 2u));
+    let c3 = c2 + 1u;
+    let layers = mat4x4f(corners[c0][0], corners[c1][0], corners[c2][0], corners[c3][0]);
+    let behind = mat4x4f(corners[c0][1], corners[c1][1], corners[c2][1], corners[c3][1]);
+    let air = mat4x4f(corners[c0][2], corners[c1][2], corners[c2][2], corners[c3][2]);
+    let haze = mat4x4f(corners[c0][3], corners[c1][3], corners[c2][3], corners[c3][3]);
+    let v0 = vec3f(air[0].w, layers[0].w, haze[0].w); // as `varied`
+    let v1 = vec3f(air[1].w, layers[1].w, haze[1].w);
+    let v2 = vec3f(air[2].w, layers[2].w, haze[2].w);
+    let v3 = vec3f(air[3].w, layers[3].w, haze[3].w);
+    // A bend shows at the corners around too: high clouds near the horizon are lower than a cell.
+    let above = varied_row(corner_index(id.xy));
+    let upper = mat4x3f(varied(c0 - 1u), v0, v1, varied(c1 + 1u));
+    let lower = mat4x3f(varied(c2 - 1u), v2, v3, varied(c3 + 1u));
+    let below = varied_row(corner_index(id.xy + vec2u(0u, 3u)));
+    let along = max(max(bend_along(above), bend_along(upper)), max(bend_along(lower), bend_along(below)));
+    let across = max(bend_across(above, upper, lower), bend_across(upper, lower, below));
+    let brightest = max(max(v0.x, v1.x), max(v2.x, v3.x));
+    let bends = max(along, across) > CURVATURE * quality.contrast * vec3f(brightest, 1.0, brightest);
+    let nearest = min(min(behind[0].w, behind[1].w), min(behind[2].w, behind[3].w));
+    let farthest = max(max(behind[0].w, behind[1].w), max(behind[2].w, behind[3].w));
     // The horizon is an edge, however bright.
-    var smooth_cell = farthest < EDGE && (nearest < 0.0) == (farthest < 0.0)
-        && all(bend <= CURVATURE * quality.contrast * vec4f(vec3f(brightest), 1.0));
+    let grounded = farthest < 0.0;
+    var edge = farthest >= EDGE || (nearest < 0.0) != grounded || bends.z;
     if SCENE {
-        smooth_cell = smooth_cell && nearest_scene(first) >= NO_SCENE;
+        edge = edge || nearest_scene(first) < NO_SCENE;
     }
-    // Nor does it matter what opaque clouds hide, but to who asks for the sky.
-    var hidden = !LAYERS && !CLOUDLESS && (!HIGH || (!VOLUME && frame.shell_top <= params.high_clouds.altitude));
+    let fine = !edge && (max(farthest, -nearest) >= FINE || any(bends));
+    // It does not matter what opaque clouds hide, but to who asks for the sky.
+    var hidden = false;
+    if !LAYERS && !CLOUDLESS {
+        let last = vec2u(frame.width, frame.sheet_row + frame.rows) - 1u;
+        hidden = (edge || fine) && (!HIGH || (!VOLUME && frame.shell_top <= params.high_clouds.altitude));
+        var i = 0u;
+        // It leaves soon: most cells show something, and those that do not ask are never hidden. Once false, it stays so,
+        // whatever lavapipe computes for a cell that has left.
+        loop {
+            let pixel = min(cell_pixel(first, i), last);
+            hidden = hidden && clouds[(pixel.y - frame.sheet_row) * frame.width + pixel.x].a == 0.0;
+            i++;
+            if !hidden || i == TILE * TILE {
+                break;
+            }
+        }
+    }
+    // Three loops, as cells side by side, which lavapipe runs together, are mostly of one kind: those of the others have one
+    // turn for them, where a branch would be run in full.
+    let fine_high = HIGH && fine && !hidden && !grounded;
+    let fine_ground = GROUND_SHADOW && fine && !hidden && grounded;
+    let smooth_cell = !fine_high && !fine_ground;
     var i = 0u;
     loop {
-        let place = vec2u(i % TILE, i / TILE);
-        let pixel = first + place;
-        if all(pixel < vec2u(frame.width, frame.sheet_row + frame.rows)) {
-            let index = (pixel.y - frame.sheet_row) * frame.width + pixel.x;
-            let share = vec2f(place) / f32(TILE);
-            let rest = 1.0 - share;
-            let shares = vec4f(rest.x * rest.y, share.x * rest.y, rest.x * share.y, share.x * share.y);
-            let layer = high * shares;
-            let sky = behind * shares;
-            let far = Layer(layer.rgb, layer.a, select(sky.a, -1.0 - sky.a, sky.a < 0.0));
-            var seen = far;
-            if !CLOUDLESS {
-                let here = marched_layer(index);
-                hidden = hidden && here.transmittance == 0.0;
-                let depth = far.distance / max(1.0 - far.transmittance, 1e-6);
-                let near = Layer(here.radiance, here.transmittance, (1.0 - here.transmittance) * here.distance);
-                seen = over(near, far);
-                if HIGH {
-                    let under = over(far, near);
-                    let first = depth < here.distance;
-                    seen = Layer(
-                        select(seen.radiance, under.radiance, first),
-                        seen.transmittance,
-                        select(seen.distance, under.distance, first),
-                    );
-                }
-            }
-            put(index, Sight(seen, sky.rgb, 1.0));
-        }
-        if i == TILE * TILE - 1u {
-            break;
+        if smooth_cell && in_sheet(first, i) {
+            let layer = layers * corner_shares(i);
+            let sky = behind * corner_shares(i);
+            // Before the ground there is the lack of light in the shadows.
+            let high = Layer(select(layer.rgb, vec3f(0.0), grounded), layer.a, sky.w);
+            put_behind(sheet_index(first, i), high, sky.rgb + select(vec3f(0.0), layer.rgb, grounded));
         }
         i++;
+        if i >= select(1u, TILE * TILE, smooth_cell) {
+            break;
+        }
     }
-    if !smooth_cell && !hidden {
+    if HIGH {
+        var n = 0u;
+        loop {
+            if fine_high && in_sheet(first, n) {
+                let direction = view_direction(vec2f(cell_pixel(first, n)) + 0.5).xyz;
+                let layer = high_layer(direction, hit_sphere(direction, frame.power_high).far, true);
+                let shares = corner_shares(n);
+                let before = Air((air * shares).rgb, (haze * shares).rgb);
+                put_behind(sheet_index(first, n), through_air(layer, before), (behind * shares).rgb);
+            }
+            n++;
+            if n >= select(1u, TILE * TILE, fine_high) {
+                break;
+            }
+        }
+    }
+    if GROUND_SHADOW {
+        var n = 0u;
+        loop {
+            if fine_ground && in_sheet(first, n) {
+                let direction = view_direction(vec2f(cell_pixel(first, n)) + 0.5).xyz;
+                let p = hit_sphere(direction, frame.power_ground).near * direction;
+                let sun = ground_sun(p, cos_zenith_at(p, frame.sun_direction));
+                let shares = corner_shares(n);
+                let lit = (behind * shares).rgb - (1.0 - sun) * (air * shares).rgb;
+                put_behind(sheet_index(first, n), Layer(vec3f(0.0), 1.0, 0.0), lit);
+            }
+            n++;
+            if n >= select(1u, TILE * TILE, fine_ground) {
+                break;
+            }
+        }
+    }
+    if edge && !hidden {
         active_rays[atomicAdd(&ray_count, 1u)] = id.y * columns + id.x;
     }
+}
+
+// What varies between corners: the brightness of all that is behind the marched clouds, the transmittance of the high ones,
+// and the brightness without those, or without shadows.
+fn varied(corner: u32) -> vec3f {
+    return vec3f(corners[corner][2].w, corners[corner][0].w, corners[corner][3].w);
+}
+
+fn varied_row(first: u32) -> mat4x3f {
+    return mat4x3f(varied(first), varied(first + 1u), varied(first + 2u), varied(first + 3u));
+}
+
+// The largest second difference in a row of corners, and across three.
+fn bend_along(row: mat4x3f) -> vec3f {
+    return max(abs(row[0] - 2.0 * row[1] + row[2]), abs(row[1] - 2.0 * row[2] + row[3]));
+}
+
+fn bend_across(a: mat4x3f, b: mat4x3f, c: mat4x3f) -> vec3f {
+    let bend = a - 2.0 * b + c;
+    return max(max(abs(bend[0]), abs(bend[1])), max(abs(bend[2]), abs(bend[3])));
+}
+
+// The pixel of a number of the cell that begins at `first`.
+fn cell_pixel(first: vec2u, i: u32) -> vec2u {
+    return first + vec2u(i % TILE, i / TILE);
+}
+
+fn in_sheet(first: vec2u, i: u32) -> bool {
+    return all(cell_pixel(first, i) < vec2u(frame.width, frame.sheet_row + frame.rows));
+}
+
+fn sheet_index(first: vec2u, i: u32) -> u32 {
+    let pixel = cell_pixel(first, i);
+    return (pixel.y - frame.sheet_row) * frame.width + pixel.x;
+}
+
+// Shares of a cell's corners in a pixel.
+fn corner_shares(i: u32) -> vec4f {
+    let share = vec2f(vec2u(i % TILE, i / TILE)) / f32(TILE);
+    let rest = 1.0 - share;
+    return vec4f(rest.x * rest.y, share.x * rest.y, rest.x * share.y, share.x * share.y);
+}
+
+// Puts a pixel: what was marched there before or behind the high clouds, and what is behind both.
+fn put_behind(index: u32, high: Layer, background: vec3f) {
+    var seen = high;
+    if !CLOUDLESS {
+        let here = marched_layer(index);
+        let depth = high.distance / max(1.0 - high.transmittance, 1e-6);
+        let near = Layer(here.radiance, here.transmittance, (1.0 - here.transmittance) * here.distance);
+        seen = over(near, high);
+        if HIGH {
+            let under = over(high, near);
+            let first = depth < here.distance;
+            seen = Layer(
+                select(seen.radiance, under.radiance, first),
+                seen.transmittance,
+                select(seen.distance, under.distance, first),
+            );
+        }
+    }
+    put(index, sight_to(seen, background));
 }
 
 // How near the user's scene comes in a cell.
@@ -270,6 +370,15 @@ struct Sight {
     seen: Layer,
     background: vec3f,
     opacity: f32,
+    // What is smooth where high clouds and shadows are not.
+    high_air: Air, // before the high clouds
+    sunlight: vec3f, // that clouds may keep from the ground, as the eye sees it
+    shadow: vec3f, // how much of it they do
+}
+
+// Clouds and what is behind them.
+fn sight_to(seen: Layer, background: vec3f) -> Sight {
+    return Sight(seen, background, 1.0, Air(vec3f(1.0), vec3f(0.0)), vec3f(0.0), vec3f(0.0));
 }
 
 // What is seen in a direction, with the clouds that were marched there, to the user's scene at a pixel.
@@ -287,7 +396,7 @@ fn sight_of(direction: vec3f, pixel: vec2u, scene: f32, here: Layer) -> Sight {
     }
 
     // The march has seen them through the air.
-    var seen = Layer(here.radiance, here.transmittance, (1.0 - here.transmittance) * here.distance);
+    var found = sight_to(Layer(here.radiance, here.transmittance, (1.0 - here.transmittance) * here.distance), air.radiance);
     if HIGH {
         // The high clouds where the ray enters their sphere, which it cannot from inside, and where it leaves it; each
         // before or behind the clouds. The loop costs lavapipe one of the two where there is one, a branch both.
@@ -298,7 +407,8 @@ fn sight_of(direction: vec3f, pixel: vec2u, scene: f32, here: Layer) -> Sight {
         loop {
             let at = select(high.near, high.far, crossing == 1);
             let hit = high.hit && at > 0.0 && at < scene && !(ground.enters && at > ground.near);
-            let layer = through_air(high_layer(direction, at, hit), direction, way, texels, sky_behind);
+            found.high_air = air_to(direction, at, way, texels, sky_behind);
+            let layer = through_air(high_layer(direction, at, hit), found.high_air);
             if at < here.distance {
                 before = over(before, layer);
             } else {
@@ -309,36 +419,41 @@ fn sight_of(direction: vec3f, pixel: vec2u, scene: f32, here: Layer) -> Sight {
             }
             crossing = 1;
         }
-        seen = over(over(before, seen), behind);
+        found.seen = over(over(before, found.seen), behind);
     }
 
-    var background = air.radiance;
     if ground.enters {
         let p = ground.near * direction;
-        var lit = ground_seen(p);
+        found.background += air.transmittance * ground_seen(p);
         if GROUND_SHADOW {
-            lit = ground_in_shadow(lit, p);
+            let mu = cos_zenith_at(p, frame.sun_direction);
+            found.sunlight = air.transmittance * kept_sunlight(mu);
+            found.shadow = (1.0 - ground_sun(p, mu)) * found.sunlight;
+            found.background = max(found.background - found.shadow, vec3f(0.0));
         }
-        background += air.transmittance * lit;
     } else if params.sun.visible > 0u {
-        background += air.transmittance * sun_disc(direction);
+        found.background += air.transmittance * sun_disc(direction);
     }
-    var opacity = 1.0;
     if SCENE && scene < NO_SCENE {
         let bright = scene_radiance(pixel);
-        background = through_air(Layer(bright, 0.0, scene), direction, way, texels, sky_behind).radiance;
+        let before = air_to(direction, scene, way, texels, sky_behind);
+        found.background = through_air(Layer(bright, 0.0, scene), before).radiance;
         if frame.scene_lit == 0u {
             // The caller puts a scene of his own behind: what he adds is dimmed by cloud and air.
-            let white = through_air(Layer(vec3f(1.0), 0.0, scene), direction, way, texels, sky_behind).radiance;
-            opacity = 1.0 - seen.transmittance * dot(white - background, LUMINANCE);
+            let white = through_air(Layer(vec3f(1.0), 0.0, scene), before).radiance;
+            found.opacity = 1.0 - found.seen.transmittance * dot(white - found.background, LUMINANCE);
         }
     }
-    return Sight(seen, background, opacity);
+    return found;
 }
 
-// The ground without the sun that clouds keep from it.
-fn ground_in_shadow(lit: vec3f, p: vec3f) -> vec3f {
-    let mu = cos_zenith_at(p, frame.sun_direction);
+// Sunlight that the ground sends on and clouds may keep from it, as in `ground_radiance`.
+fn kept_sunlight(mu: f32) -> vec3f {
+    return (1.0 - PASSED_ON) * params.atmosphere.ground_albedo / PI * sun_irradiance(0.0, mu) * max(mu, 0.0);
+}
+
+// How much sun reaches a point on the ground through all clouds.
+fn ground_sun(p: vec3f, mu: f32) -> f32 {
     var sun = 1.0;
     if !CLOUDLESS {
         sun = baked_ground_sun(p);
@@ -346,9 +461,7 @@ fn ground_in_shadow(lit: vec3f, p: vec3f) -> vec3f {
     if HIGH {
         sun *= exp(-high_depth_over(p, mu));
     }
-    // As in `ground_radiance`.
-    let direct = sun_irradiance(0.0, mu) * max(mu, 0.0);
-    return max(lit - (1.0 - PASSED_ON) * (1.0 - sun) * params.atmosphere.ground_albedo / PI * direct, vec3f(0.0));
+    return sun;
 }
 
 fn ground_seen(p: vec3f) -> vec3f {
@@ -358,15 +471,22 @@ fn ground_seen(p: vec3f) -> vec3f {
     return vec3f(0.0);
 }
 
-// A layer at a distance behind the air in front of it.
-fn through_air(layer: Layer, direction: vec3f, way: Way, texels: AirTexels, sky: vec3f) -> Layer {
-    let opacity = 1.0 - layer.transmittance;
-    if !AIR {
-        return Layer(layer.radiance, layer.transmittance, opacity * layer.distance);
+// The air before a distance on a ray, if there is any.
+fn air_to(direction: vec3f, distance: f32, way: Way, texels: AirTexels, sky: vec3f) -> Air {
+    if AIR {
+        return air_before(direction, distance, way, texels, sky);
     }
-    let air = air_before(direction, layer.distance, way, texels, sky);
-    let radiance = layer.radiance * air.transmittance + opacity * air.radiance;
-    return Layer(radiance, layer.transmittance, opacity * layer.distance);
+    return Air(vec3f(1.0), vec3f(0.0));
+}
+
+// A layer behind the air in front of it.
+fn through_air(layer: Layer, air: Air) -> Layer {
+    let opacity = 1.0 - layer.transmittance;
+    return Layer(
+        layer.radiance * air.transmittance + opacity * air.radiance,
+        layer.transmittance,
+        opacity * layer.distance,
+    );
 }
 
 fn over(front: Layer, back: Layer) -> Layer {

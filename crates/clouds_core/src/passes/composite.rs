@@ -51,7 +51,7 @@ pub(crate) struct Backdrop {
 
 impl Backdrop {
     pub fn new(gpu: &Gpu, size: [u32; 2]) -> Self {
-        Self { corners: gpu.buffer("corners", 32 * corners(size).map(u64::from).iter().product::<u64>()) }
+        Self { corners: gpu.buffer("corners", 64 * corners(size).map(u64::from).iter().product::<u64>()) }
     }
 
     pub fn bindings(&self) -> Bindings<'_> {

@@ -6,8 +6,10 @@ use std::time::Duration;
 const RATIO: f64 = 1.2;
 /// The last step: a fifth of the window's width and height.
 const LAST: f64 = 18.0;
-/// Frames that a judgement is the median of: one that compiles or bakes says nothing.
+/// Frames of a judgement, and which of them, by its time, it is of: what one in five takes to bake or compile says nothing, and most
+/// of the others are to be in time.
 const FRAMES: usize = 5;
+const JUDGED: usize = 3;
 /// Steps that frames may be late by (5 %): as times are noisy, the step would change to and fro.
 const LATE: f64 = 0.27;
 
@@ -45,7 +47,7 @@ impl Resolution {
             return;
         }
         self.seconds.sort_by(f64::total_cmp);
-        let late = (self.seconds[FRAMES / 2] / wanted.as_secs_f64()).log(RATIO);
+        let late = (self.seconds[JUDGED] / wanted.as_secs_f64()).log(RATIO);
         self.seconds.clear();
         // Up by two at most, or frames that were quick by chance would be followed by slow ones.
         let steps = if late > LATE { late.ceil() } else { late.ceil().clamp(-2.0, 0.0) };

@@ -18,20 +18,25 @@ const SHARE_SIZE: [u32; 3] = [32, 64, 24];
 type Key = (params::Sun, params::Atmosphere, [f64; 3], [f32; 3]);
 
 /// Where the sky is seen from, near the eye: the same place for all eyes around it, so that one that flies has a new sky
-/// every few metres of height or hundreds of metres of way, not in every frame. What that costs: half a percent of
-/// the height, which changes the sky by less than that, and a hundredth of a degree of the sun's elevation.
+/// every ten metres of height or hundreds of metres of way, not in every frame. What that costs: half of what a step changes,
+/// and a hundredth of a degree of the sun's elevation.
 fn viewpoint(eye: DVec3, params: &Params) -> DVec3 {
     near(eye, params, 1e-4 * f64::from(params.atmosphere.planet_radius))
 }
 
-/// A place near the eye, the same for all eyes around it: at most half a `step` beside it, m, and half a percent of its height,
-/// or half a metre, above or below.
+/// Steps of height for each factor of e of the height over a kilometre below the ground, as air thins out: of 8 m at the ground, 88 m
+/// at 10 km. Measured, one of them changes no direction of the sky by more than 1.3 % (sun at 2 to 45 degrees) or 2.1 % (at -4); on
+/// average 0.1 % near the ground, 0.2 % at 1 km and 1.1 % at 10 km.
+const HEIGHT_STEPS: f64 = 125.0;
+
+/// A place near the eye, the same for all eyes around it: at most half a `step` beside it, m, and half a step of height above or
+/// below.
 pub(super) fn near(eye: DVec3, params: &Params, step: f64) -> DVec3 {
     let radius = f64::from(params.atmosphere.planet_radius);
     let centre = DVec3::new(0.0, 0.0, -radius);
     let height = (eye - centre).length() - radius;
-    let steps = ((1.0 + height.abs() / 100.0).ln() * 100.0).round();
-    let height = 100.0 * ((steps / 100.0).exp() - 1.0) * height.signum();
+    let steps = ((1.0 + height.abs() / 1000.0).ln() * HEIGHT_STEPS).round();
+    let height = 1000.0 * ((steps / HEIGHT_STEPS).exp() - 1.0) * height.signum();
     let place = (eye / step).round() * step - centre;
     centre + place.try_normalize().unwrap_or(DVec3::Z) * (radius + height)
 }

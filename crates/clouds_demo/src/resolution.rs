@@ -49,8 +49,9 @@ impl Resolution {
         self.seconds.sort_by(f64::total_cmp);
         let late = (self.seconds[JUDGED] / wanted.as_secs_f64()).log(RATIO);
         self.seconds.clear();
-        // Up by two at most, or frames that were quick by chance would be followed by slow ones.
-        let steps = if late > LATE { late.ceil() } else { late.ceil().clamp(-2.0, 0.0) };
+        // Up with a step to spare and by two at most, or frames that were quick by chance would be followed by slow ones: the first of
+        // another size takes twice as long.
+        let steps = if late > LATE { late.ceil() } else { (late + 1.0).ceil().clamp(-2.0, 0.0) };
         self.step = (self.step + steps).clamp(0.0, LAST);
     }
 }
@@ -79,7 +80,7 @@ mod tests {
                 let shares = run(&mut resolution, fixed, 4e6, 0.1, 200);
                 let [w, h] = resolution.of([1280, 720]);
                 let took = fixed + f64::from(w * h) / 4e6;
-                assert!((0.1 / RATIO..0.105).contains(&took), "{w} x {h}: {took}");
+                assert!((0.1 / RATIO / RATIO..0.105).contains(&took), "{w} x {h}: {took}");
                 assert!(shares[100..].windows(2).all(|pair| pair[0] == pair[1]), "to and fro: {shares:?}");
             }
         }

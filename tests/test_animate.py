@@ -251,7 +251,8 @@ def test_history_grows_until_each_pixel_has_had_its_ray():
         assert make.history_length.shape == SIZE[::-1]
         lengths.append(make.history_length)
     assert (lengths[1] == 16).all()
-    # What comes in at the right has been guessed, but for one pixel in sixteen; so are others once more in each frame.
+    # What comes in at the right has been guessed, but for one pixel in sixteen, and is once more
+    # in each frame, but for another.
     new = lengths[2] < 16
     assert not new[:, : SIZE[0] // 2].any() and new[:52, -8:].mean() == 15 / 16
     assert (lengths[2][new] == 1).all()

@@ -94,7 +94,8 @@ def test_same_inputs_same_bytes(renderer):
     make.density([[0, 0, 2000]], other[1])
     list(make.animate([(*other, 0.0), (*other, 1.0)]))
     assert make.render(camera, params, time=12.5).tobytes() == first
-    # Clouds that are where they were among shadows that are not: the wind has gone on by a whole step of those.
+    # Clouds that are where they were among shadows that are not: the wind has gone on by a whole
+    # step of those.
     make.render(*other)
     make.render(camera, params, time=12.5 + 32.0 / params.wind.speed)
     assert make.render(camera, params, time=12.5).tobytes() == first

@@ -1,8 +1,8 @@
 //! Temporal reprojection: one pixel in sixteen is marched, the others come from the frame before.
 
-use super::{Bindings, Scene};
 use super::march::Marched;
 use super::refine::Refined;
+use super::{Bindings, Scene};
 use crate::error::Result;
 use crate::frame::Frame;
 use crate::gpu::{Gpu, Work};

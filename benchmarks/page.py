@@ -172,10 +172,12 @@ def _animation(found: Row) -> str:
                 f"{1e3 * row['seconds']:.0f}",
                 f"{1e3 * row['processor_seconds'] / cores:.0f}",
                 ", ".join(_percent(e) for e in row["rel_rmse"]),
+                ", ".join(_percent(e) for e in row["rel_rmse_high"]),
             ]
         )
-    heads = ["scene", "pixels", "quality", "still, s", "frame, ms", "processor ms / cores", "error"]
-    return _table(heads, lines)
+    heads = ["scene", "pixels", "quality", "still, s", "frame, ms", "processor ms / cores"]
+    errors = ["frames from stills", "frame, still from `high`"]
+    return _table(heads + errors, lines)
 
 
 def _filled(text: str, blocks: dict[str, str]) -> str:

@@ -169,19 +169,27 @@ def growth(repeats: int) -> list[Row]:
 
 
 def animation(scene: str, size: Size, quality: str, *, errors: bool = True) -> Row:
-    """A flight at 60 m/s: the time of a frame, and how far frames are from stills."""
+    """A flight at 60 m/s: the time of a frame, and how far frames and stills are from each other.
+
+    And how far the last of both is from `high`, whose stills have hardly any noise.
+    """
     method = nubis.quality(quality)
     shots = list(_flight(scene))
     frames = nubis.Renderer(*size, quality=method).animate(shots)
     stills = nubis.Renderer(*size, quality=method)
-    wall, processor, differences = [], [], []
+    wall, processor, differences, truth = [], [], [], []
     for i in range(FRAMES):
         started, used = perf_counter(), process_time()
         frame = next(frames)
         wall.append(perf_counter() - started)
         processor.append(process_time() - used)
         if errors and i in (FRAMES // 2, FRAMES - 1):
-            differences.append(_difference(frame, stills.render(*shots[i][:2], time=shots[i][2])))
+            alone = stills.render(*shots[i][:2], time=shots[i][2])
+            differences.append(_difference(frame, alone))
+            if i == FRAMES - 1:
+                high = nubis.Renderer(*size, quality="high")
+                high = high.render(*shots[i][:2], time=shots[i][2])
+                truth = [_difference(frame, high), _difference(alone, high)]
     return {
         "scene": scene,
         "size": size,
@@ -189,6 +197,7 @@ def animation(scene: str, size: Size, quality: str, *, errors: bool = True) -> R
         "seconds": float(np.median(wall[2:])),
         "processor_seconds": float(np.median(processor[2:])),
         "rel_rmse": differences,
+        "rel_rmse_high": truth,
     }
 
 

@@ -12,7 +12,7 @@ export VIRTUAL_ENV := $(CURDIR)/$(VENV)
 unexport CONDA_PREFIX
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help setup build generate render gallery demo window test stress types lint bench bench-kernels heat profile soak clean
+.PHONY: help setup build generate render gallery steps demo window test stress types lint bench bench-kernels heat profile soak clean
 
 help: ## List the commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -58,6 +58,10 @@ render: build ## Render every scene into out/
 gallery: build ## Render the pictures of the README and of docs/clouds.md into docs/images
 	$(BIN)/python -m nubis render --all --size 640x360 --out docs/images
 	$(BIN)/python -m docs.gallery
+
+steps: build window ## Take the pictures of docs/demo.md
+	cargo build --release -p clouds_demo
+	$(BIN)/python -m docs.steps
 
 demo: setup ## Open a window to fly through the clouds
 	cargo run --release -p clouds_demo

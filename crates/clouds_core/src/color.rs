@@ -8,7 +8,7 @@ pub const TONE_MAPS: [&str; 3] = ["agx", "aces", "none"];
 type Rgb = [f32; 3];
 
 /// Shares of red, green and blue in the luminance, for Rec. 709 primaries (ITU-R BT.709).
-const LUMINANCE: [f64; 3] = [0.2126, 0.7152, 0.0722];
+pub const LUMINANCE: [f64; 3] = [0.2126, 0.7152, 0.0722];
 
 fn transform(m: &[[f32; 3]; 3], v: Rgb) -> Rgb {
     m.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2])

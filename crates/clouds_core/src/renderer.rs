@@ -28,6 +28,7 @@ use crate::passes::phase::PhaseTable;
 use crate::passes::profile::Profile;
 use crate::passes::rays::Rays;
 use crate::passes::refine::{COARSEST, Refined};
+pub use crate::passes::reproject::ROUND;
 use crate::passes::reproject::{Followed, History, ORDER, STRIDE};
 use crate::passes::shadow::{self, GroundShadow};
 use crate::passes::sky::Sky;
@@ -484,7 +485,7 @@ impl Renderer {
         }
         // While anything moves, each round of the sixteen pixels moves the blue noise on by the golden ratio; a static
         // shot keeps the still's, and so becomes the still.
-        let round = if frame.moving > 0 { index / 16 } else { 0 };
+        let round = if frame.moving > 0 { index / ROUND } else { 0 };
         frame.jitter_shift = (f64::from(round) * 0.618_033_988_749_895).fract() as f32;
         let variant = Variant::of_frame(params, quality, &frame);
         let scene = gpu.compiling(&Method::March.kernels(params, quality, &frame, variant, false), || {
@@ -508,7 +509,7 @@ impl Renderer {
             now.begin(gpu);
         } else {
             frame.stride = STRIDE;
-            [frame.subpixel_x, frame.subpixel_y] = ORDER[index as usize % 16];
+            [frame.subpixel_x, frame.subpixel_y] = ORDER[(index % ROUND) as usize];
             frame.march_width = cells[0];
             frame.sheet_rows = cells[1];
             march_sheet(&mut ctx, &scene, &mut frame, quality, &mut self.march_pace, refined, fresh)?;
@@ -603,7 +604,7 @@ impl Renderer {
     }
 
     /// How much each pixel of the last frame of [`Renderer::animate`] rests on, row by row, from 1, a guess from the rays
-    /// around it in that frame alone, to 16, a ray of its own that has been followed since; between those, the mean of guesses
+    /// around it in that frame alone, to [`ROUND`], a ray of its own that has been followed since; between those, the mean of guesses
     /// in so many frames. Empty where no frame was reprojected or could be: before the first, after a cut, without clouds, and
     /// where frames converge or are traced.
     pub fn history_length(&mut self) -> Result<Vec<u32>> {

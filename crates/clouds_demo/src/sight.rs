@@ -1,13 +1,12 @@
 //! What of a picture is shown: itself, or what lies behind it.
 
-use clouds_core::renderer::Picture;
+use clouds_core::color::LUMINANCE;
+use clouds_core::renderer::{Picture, ROUND};
 
 /// Evaluations that are white, as in thesis2018's figure 39.
 pub const WHITE: f32 = 500.0;
 /// Relative error of luminance that is white.
 pub const WHITE_ERROR: f32 = 0.2;
-/// Frames of history that are white: a ray for every pixel.
-const WHITE_HISTORY: f32 = 16.0;
 /// The distance at which half of the light is left in the picture of depth, m.
 const HALF: f32 = 5000.0;
 
@@ -66,7 +65,7 @@ pub fn pixels_of(sight: Sight, picture: &Picture) -> Vec<u8> {
 
 /// The pixels of the relative error of one picture against another of luminance, from black to white at [`WHITE_ERROR`].
 pub fn error_pixels(picture: &Picture, truth: &Picture) -> Vec<u8> {
-    let luminance = |pixel: &[f32]| 0.2126 * pixel[0] + 0.7152 * pixel[1] + 0.0722 * pixel[2];
+    let luminance = |pixel: &[f32]| pixel.iter().zip(LUMINANCE).map(|(v, share)| v * share as f32).sum::<f32>();
     let pairs = picture.image.chunks_exact(4).zip(truth.image.chunks_exact(4));
     pairs
         .flat_map(|(a, b)| {
@@ -82,7 +81,7 @@ pub fn history_pixels(lengths: &[u32], [width, height]: [u32; 2]) -> Vec<u8> {
     if lengths.is_empty() {
         return opaque([0.0; 3]).repeat(width as usize * height as usize);
     }
-    lengths.iter().flat_map(|length| opaque(heat(*length as f32 / WHITE_HISTORY))).collect()
+    lengths.iter().flat_map(|length| opaque(heat(*length as f32 / ROUND as f32))).collect()
 }
 
 /// Black, red, yellow, white from 0 to 1.

@@ -345,7 +345,7 @@ fn nearest_scene(first: vec2u) -> f32 {
     let last = vec2u(frame.width, frame.sheet_row + frame.rows) - 1u;
     var nearest = NO_SCENE;
     for (var i = 0u; i < TILE * TILE; i++) {
-        nearest = min(nearest, scene_distance(min(first + vec2u(i % TILE, i / TILE), last)));
+        nearest = min(nearest, scene_distance(min(cell_pixel(first, i), last)));
     }
     return nearest;
 }

@@ -13,8 +13,9 @@ const STRIDE = 4;
 // (error 13.0 %), 2 keeps what 4 keeps (11.7 and 11.4 %) and still catches ghosts.
 const SPREAD = 2.0;
 
-// Frames in which every pixel of a cell is marched once. A pixel rests on so many when it has had its own ray and has been
-// followed since; before that on as many as it has been guessed in, from neighbours, and its value is their mean.
+// Frames in which every pixel of a cell is marched once (as in reproject.rs). A pixel rests on so many when it has had its own
+// ray and has been followed since; before that on as many as it has been guessed in, from neighbours, and its value is their
+// mean.
 const ROUND = 16u;
 
 // How many times as far as its nearest the user's scene may be around a cell, now and in the frame before. Past that

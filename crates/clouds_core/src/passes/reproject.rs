@@ -13,7 +13,7 @@ pub(crate) const STRIDE: u32 = 4;
 
 /// The order in which the sixteen pixels of a cell are marched: a Bayer matrix, so that any few of them in a row are
 /// spread over the cell.
-pub(crate) const ORDER: [[u32; 2]; 16] = [
+pub(crate) const ORDER: [[u32; 2]; ROUND as usize] = [
     [0, 0],
     [2, 2],
     [2, 0],
@@ -40,7 +40,7 @@ pub(crate) struct Followed {
 }
 
 /// Frames in which every pixel is marched once.
-pub(crate) const ROUND: u32 = STRIDE * STRIDE;
+pub const ROUND: u32 = STRIDE * STRIDE;
 
 impl Followed {
     pub fn new(gpu: &Gpu, pixels: u64) -> Self {

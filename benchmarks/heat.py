@@ -75,8 +75,9 @@ def ours() -> dict[str, nubis.Quality]:
 
 def panels(camera: nubis.Camera, params: nubis.Params, size: Size) -> list[Panel]:
     """All stages of a picture."""
-    # As in the source, which has one weather map: a full evaluation reads four textures.
-    params = params.with_(**{"weather.broad_variety": 0.0})
+    # As in the source, which has one weather map and one detail: a full evaluation reads four
+    # textures.
+    params = params.with_(**{"weather.broad_variety": 0.0, "clouds.fine_detail": 0.0})
     # Without a sun there are no light samples, and the view steps are the same.
     night = params.with_(**{"sun.irradiance": (0.0, 0.0, 0.0)})
     by_name = stages()

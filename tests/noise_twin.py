@@ -621,4 +621,7 @@ class Field:
         moved[:, :2] += f32(clouds.curl) * (1 - height[:, None]) * swirl
         at = moved / f32(clouds.detail_scale)
         detail = sample(self.textures["detail_noise"], DETAIL_SIZE, at)[:, :3] @ FBM
+        finer = 5 * at[:, [2, 0, 1]]
+        fine = sample(self.textures["detail_noise"], DETAIL_SIZE, finer)[:, :3] @ FBM
+        detail = np.clip(detail + f32(clouds.fine_detail) * (fine - 0.5), 0, 1)
         return eroded(shape, detail, height, f32(clouds.detail))

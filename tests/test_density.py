@@ -151,7 +151,10 @@ def test_density_is_the_published_sampler(renderer, rng, time):
     noise = read("shape_noise", moved(at, w.speed) / c.shape_scale)
     swirl = read("curl_noise", moved(at, w.detail_speed)[:, :2] / c.curl_scale)[:, :2]
     swirled = at + c.curl * (1 - height[:, None]) * swirl
-    detail = read("detail_noise", moved(swirled, w.detail_speed) / c.detail_scale)[:, :3] @ FBM
+    at = moved(swirled, w.detail_speed) / c.detail_scale
+    detail = read("detail_noise", at)[:, :3] @ FBM
+    fine = read("detail_noise", 5 * at[:, [2, 0, 1]])[:, :3] @ FBM
+    detail = np.clip(detail + c.fine_detail * (fine - 0.5), 0, 1)
 
     profile = height_profile(height, np.full(len(height), 0.6), c)
     shape = with_coverage(base_shape(noise) * profile, 0.8)

@@ -97,7 +97,7 @@ def test_methods_agree(renderer, quality):
 
 #: Relative RMSE that lighting a tenth of a pixel as one may cost. Measured at this size: 0.6 to
 #: 1.4 %, in `storm` 3.6 %; a share of 0.03 costs 0.1 to 0.8 %.
-SHARES = {"fair_weather": 0.012, "overcast": 0.015, "in_cloud": 0.02, "storm": 0.05}
+SHARES = {"fair_weather": 0.015, "overcast": 0.015, "in_cloud": 0.02, "storm": 0.05}
 
 
 @pytest.mark.parametrize("scene", SHARES)
@@ -277,7 +277,7 @@ def test_leaps_miss_no_small_cloud(renderer):
         lost = [
             np.abs(found["transmittance"] - every["transmittance"]).mean() for found in (big, leaps)
         ]
-        assert lost[1] < lost[0] + 2e-4
+        assert lost[1] < lost[0] + 5e-4
         assert leaps["samples"].sum() < (0.85 if sky is few else 1.0) * big["samples"].sum()
 
 

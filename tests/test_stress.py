@@ -262,6 +262,8 @@ def test_a_little_change_changes_little(data):
       moves 60 mm of detail;
     - planets to 10 000 km: around one of a million kilometres a level ray that turns by a
       microradian meets the high clouds 1 km farther;
+    - a second deck that is there before: with it rays take other steps, up to its top, and the
+      light of those of `draft` is another by up to 15 %;
     - an eye 10 cm at least from where something begins.
     """
     params = data.draw(strategies.params(**STEADY))
@@ -314,6 +316,7 @@ def test_a_little_change_changes_little(data):
         group, name = data.draw(st.sampled_from(SMOOTH_FIELDS))
         which, value = f"{group}.{name}", getattr(getattr(params, group), name)
         low, high = allowed(group, name)[1]
+        assume((which, value) != ("upper_clouds.coverage", 0))
         try:
             if value == 0:
                 # Any light is infinitely more than none: a millionth is compared with the whole.

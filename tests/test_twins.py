@@ -244,6 +244,7 @@ def any_sky(rng, params):
             "clouds.shape_scale": log_uniform(1000, 20_000),
             "clouds.detail_scale": log_uniform(100, 2000),
             "clouds.detail": rng.uniform(0.1, 0.6),
+            "clouds.fine_detail": rng.choice([0.0, 0.5, 1.0]),
             "clouds.curl_scale": log_uniform(500, 5000),
             "clouds.curl": rng.uniform(20, 300),
             "weather.extent": log_uniform(10_000, 100_000),

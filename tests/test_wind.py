@@ -154,7 +154,7 @@ def test_still_weather_keeps_a_sky_in_place(renderer):
     assert 0.1 < (first.max(axis=1) > 0).mean() < 0.7
     place = alike(silhouette(first), silhouette(kept))
     assert place > 0.8
-    assert alike(first, kept) < 0.6
+    assert alike(first, kept) < 0.7
     assert alike(silhouette(first), silhouette(gone)) < 0.3
 
 

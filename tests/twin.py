@@ -195,6 +195,8 @@ def smooth_params(**changes):
         "clouds.top": 3000.0,
         "clouds.type": 0.5,
         "clouds.extinction": 0.004,
+        "clouds.detail": 0.4,
+        "clouds.fine_detail": 0.0,
         "clouds.shape_scale": 40_000.0,
         "clouds.detail_scale": 20_000.0,
         "clouds.curl_scale": 40_000.0,

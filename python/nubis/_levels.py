@@ -24,15 +24,20 @@ def _make() -> dict[str, Params]:
         },
         "scattered": {"clouds.coverage": 0.56, "clouds.type": 0.8},
         "broken": {"clouds.coverage": 0.7, "clouds.type": 0.7},
-        "overcast": {"clouds.coverage": 0.9, "clouds.type": 0.35},
+        "overcast": {"clouds.coverage": 0.9, "clouds.type": 0.35, "clouds.extinction": 0.1},
         "stratus": {
             "clouds.coverage": 0.95,
             "clouds.type": 0.1,
+            "clouds.extinction": 0.1,
             "clouds.base": 400.0,
             "clouds.top": 2400.0,
             "high_clouds.coverage": 0.0,
         },
-        "stratocumulus": {"clouds.coverage": 0.62, "clouds.type": 0.5},
+        "stratocumulus": {
+            "clouds.coverage": 0.6,
+            "clouds.type": 0.5,
+            "clouds.extinction": 0.1,
+        },
         "cumulus": {
             "clouds.coverage": 0.5,
             "clouds.type": 1.0,

@@ -55,7 +55,7 @@ def _make() -> dict[str, tuple[Camera, Params]]:
         ),
         "in_cloud": (
             _look((0, 0, 2000), 20, 4),
-            fair.with_(**{"clouds.coverage": 0.5}),
+            fair.with_(**{"clouds.coverage": 0.46}),
         ),
         "above": (
             _look((0, 0, 3500), 20, -10),

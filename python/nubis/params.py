@@ -79,6 +79,9 @@ class Clouds(Block):
         Width of one tile of the detail that erodes the edges. Allowed: a number from 10 to 50000 m.
     detail : float
         How deep the detail erodes the edges (nubis2015: 0.2). Allowed: a number from 0 to 1.
+    fine_detail : float
+        How much of a finer detail, a fifth as wide, is added to it: what shows of clouds that are
+        near. 0 leaves it out (nubis2015). Allowed: a number from 0 to 1.
     curl_scale : float
         Width of one tile of the curl noise that swirls the detail. Allowed: a number from 10 to
         50000 m.
@@ -107,12 +110,13 @@ class Clouds(Block):
     cumulonimbus_top: float = 8000.0
     anvil: float = 0.5
     rain_extinction: float = 0.0
-    extinction: float = 0.15
+    extinction: float = 0.2
     seed: int = 1
     noise: Literal["nubis2015", "vsu2022"] = "nubis2015"
     shape_scale: float = 5200.0
     detail_scale: float = 420.0
-    detail: float = 0.4
+    detail: float = 0.2
+    fine_detail: float = 0.6
     curl_scale: float = 1600.0
     curl: float = 70.0
     stratus: tuple[float, float, float, float] = (0.02, 0.05, 0.09, 0.11)
@@ -418,7 +422,7 @@ class Light(Block):
         number from 1 to 100.
     """
 
-    model: Literal["single", "nubis2015", "thesis2018", "vsu2022", "octaves", "path"] = "thesis2018"
+    model: Literal["single", "nubis2015", "thesis2018", "vsu2022", "octaves", "path"] = "octaves"
     phase: Literal["henyey_greenstein", "droplet", "mie"] = "henyey_greenstein"
     droplet_diameter: float = 20.0
     g: float = 0.6

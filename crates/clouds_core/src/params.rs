@@ -118,7 +118,7 @@ params! {
         /// Extinction of the rain that is seen below the clouds where it is heaviest; 0 hides it.
         rain_extinction: f32 = 0.0, in 0..=1 "1/m";
         /// Extinction where the density is 1.
-        extinction: f32 = 0.15, in 0..=100000000 "1/m";
+        extinction: f32 = 0.2, in 0..=100000000 "1/m";
         /// Which random shapes.
         seed: u32 = 1, in 0..=4294967295.0 "";
         /// Which noises the shapes are made of.
@@ -128,7 +128,10 @@ params! {
         /// Width of one tile of the detail that erodes the edges.
         detail_scale: f32 = 420.0, in 10..=50000 "m";
         /// How deep the detail erodes the edges (nubis2015: 0.2).
-        detail: f32 = 0.4, in 0..=1 "";
+        detail: f32 = 0.2, in 0..=1 "";
+        /// How much of a finer detail, a fifth as wide, is added to it: what shows of clouds that are near. 0 leaves it out
+        /// (nubis2015).
+        fine_detail: f32 = 0.6, in 0..=1 "";
         /// Width of one tile of the curl noise that swirls the detail.
         curl_scale: f32 = 1600.0, in 10..=50000 "m";
         /// How far curl noise displaces the detail at the base.
@@ -270,7 +273,7 @@ params! {
     /// How light becomes colour.
     Light {
         /// The physics of the light in the clouds.
-        model: Model = Model::Thesis2018;
+        model: Model = Model::Octaves;
         /// The phase function: `henyey_greenstein` of `g` (in thesis2018 and vsu2022 of `g_back`, too) as published;
         /// `droplet` a fit of real droplets, whose clouds have a silver lining (Jendersie and d'Eon 2023); `mie` the droplets
         /// themselves, with fogbow and glory. Half of what those scatter goes on within a few degrees: `path` then takes many

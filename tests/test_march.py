@@ -122,6 +122,23 @@ def test_light_for_a_share_is_that_of_each_sample(renderer, scene):
     np.testing.assert_allclose(coarse["depth"], each["depth"], rtol=1e-4)
 
 
+def test_rain_is_lit_in_small_shares(renderer):
+    """A tenth of a pixel of rain is kilometres of sun and shadow: were it lit as one, shafts had
+    edges and an error of 14 %.
+    """
+    camera, storm = nubis.scenes["storm"]
+    params = storm.with_(**{"clouds.rain_extinction": 5e-4})
+    balanced = nubis.quality("balanced").replace(contrast=0.0)
+    each, shared = (
+        renderer(96, 54, balanced.replace(light_share=share)).render_layers(camera, params)
+        for share in (0.0, balanced.light_share)
+    )
+    cloud = each["transmittance"] < 0.999
+    error = (shared["radiance"] - each["radiance"])[cloud]
+    assert np.sqrt(np.mean(error**2)) < 0.06 * each["radiance"][cloud].mean()
+    assert shared["samples"].sum() < 0.4 * each["samples"].sum()
+
+
 def test_a_veil_does_not_move_the_light_of_the_cloud_behind(renderer):
     """A slab behind a veil of less than a share is lit where it is: what was gathered before it
     does not draw its light into the gap, where the sun shines. Single scattering from straight

@@ -332,7 +332,7 @@ mod tests {
     fn python_says_what_was_changed() {
         let (_, camera, mut params) = scenes().expect("are read").remove(0);
         params.clouds.coverage = 0.7;
-        params.light.model = clouds_core::params::Model::Octaves;
+        params.light.model = clouds_core::params::Model::Vsu2022;
         let shot = Shot {
             camera: &camera,
             params: &params,
@@ -343,7 +343,7 @@ mod tests {
             tone_map: "agx",
         };
         let code = python(&shot, None);
-        assert!(code.contains("\"clouds.coverage\": 0.7,") && code.contains("\"light.model\": \"octaves\","), "{code}");
+        assert!(code.contains("\"clouds.coverage\": 0.7,") && code.contains("\"light.model\": \"vsu2022\","), "{code}");
         assert!(!code.contains("clouds.base"), "{code}");
     }
 }

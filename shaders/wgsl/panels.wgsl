@@ -76,8 +76,8 @@ fn first_share(depth: f32, density: vec2f) -> f32 {
 }
 
 // The smallest feature of the procedural field, m: a texel of the base shape or of the detail, two and a half of the finer
-// detail, which is shallow (sunlight errs by 0.4 % at most where it is partial; by 1.6 % where nothing is said of it), or a
-// part of the profile by height. The grid's cells end its panels themselves.
+// detail, which is shallow (where sunlight is partial it errs by 0.5 %, root mean square; by 1.6 % were the finer one left
+// out here), or a part of the profile by height. The grid's cells end its panels themselves.
 fn finest_feature() -> f32 {
     if VOLUME {
         return 1e30;

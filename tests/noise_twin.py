@@ -428,9 +428,9 @@ def bakes(params):
     return {
         "weather_map": lambda texels: weather_texels(texels, params.weather),
         "broad_map": lambda texels: broad_texels(texels, params.weather),
-        "shape_noise": lambda texels: shape_texels(texels, params.clouds),
+        "shape_noise": lambda texels: base_shape(shape_texels(texels, params.clouds))[..., None],
         "curl_noise": lambda texels: curl_texels(texels, params.clouds),
-        "detail_noise": lambda texels: detail_texels(texels, params.clouds),
+        "detail_noise": lambda texels: (detail_texels(texels, params.clouds) @ FBM)[..., None],
     }
 
 
@@ -600,7 +600,7 @@ class Field:
         above = (altitude + 7.4 * self.time) / 12
         at = self.carried(upright, above, (wind.direction, wind.speed))
         noise = sample(self.textures["shape_noise"], SHAPE_SIZE, at / f32(clouds.shape_scale))
-        return limit, limit * np.clip(twin.remap(base_shape(noise), 0.15, 0.65), 0, 1)
+        return limit, limit * np.clip(twin.remap(noise[:, 0], 0.15, 0.65), 0, 1)
 
     def carried(self, at, altitude, wind, scale=1.0):
         """Where the wind has brought here what was baked."""
@@ -611,8 +611,8 @@ class Field:
     def cloud(self, upright, altitude, height, profile, coverage, winds, scale):
         clouds = self.params.clouds
         at = self.carried(upright, altitude, winds[0], scale) / f32(clouds.shape_scale)
-        noise = sample(self.textures["shape_noise"], SHAPE_SIZE, at)
-        shape = with_coverage(base_shape(noise) * profile, coverage)
+        noise = sample(self.textures["shape_noise"], SHAPE_SIZE, at)[:, 0]
+        shape = with_coverage(noise * profile, coverage)
         shape = np.where(with_coverage(profile, coverage) > 0, shape, 0)
 
         moved = self.carried(upright, altitude, winds[1], scale)
@@ -620,8 +620,8 @@ class Field:
         swirl = sample(self.textures["curl_noise"], CURL_SIZE, at)[:, :2]
         moved[:, :2] += f32(clouds.curl) * (1 - height[:, None]) * swirl
         at = moved / f32(clouds.detail_scale)
-        detail = sample(self.textures["detail_noise"], DETAIL_SIZE, at)[:, :3] @ FBM
+        detail = sample(self.textures["detail_noise"], DETAIL_SIZE, at)[:, 0]
         finer = 5 * at[:, [2, 0, 1]]
-        fine = sample(self.textures["detail_noise"], DETAIL_SIZE, finer)[:, :3] @ FBM
+        fine = sample(self.textures["detail_noise"], DETAIL_SIZE, finer)[:, 0]
         detail = np.clip(detail + f32(clouds.fine_detail) * (fine - 0.5), 0, 1)
         return eroded(shape, detail, height, f32(clouds.detail))

@@ -498,8 +498,8 @@ class Quality(Block):
         How far a ray may leap through clear air, beyond `big_step`: as a share of
         `clouds.shape_scale` (of `weather.scale` or two and a half pixels of `weather.map`, if that
         is less) for each unit that the base shape lacks of being cloud. On a hit the march goes
-        back. 0 leaps no farther than `big_step`; none does where that is 1, in grids, with rain in
-        sight and with a second deck. Allowed: a number from 0 to 1.
+        back. 0 leaps no farther than `big_step`; none does where that is 1, in grids and with rain
+        in sight. Allowed: a number from 0 to 1.
     empty_samples : int
         Full samples of zero in a row after which samples are cheap again (nubis2015: 6). Allowed: a
         whole number from 1 to 4096.
@@ -551,14 +551,14 @@ class Quality(Block):
         number from 1 to 1048576.
     """
 
-    steps_zenith: int = 80
-    steps_horizon: int = 192
+    steps_zenith: int = 134
+    steps_horizon: int = 320
     step_growth: float = 1.0
-    big_step: int = 3
+    big_step: int = 5
     leap: float = 0.2
     empty_samples: int = 6
     light_steps: int = 16
-    light_share: float = 0.1
+    light_share: float = 0.15
     sun_volume: bool = False
     light_distance: float = 0.0
     far_sample: bool = False

@@ -31,8 +31,8 @@ override LIGHT_CHEAP: bool = true; // there are light samples that do not
 @group(0) @binding(42) var weather_sampler: sampler; // linear, beyond the map as weather.edge says
 
 // Baked. All half floats: lavapipe filters those exactly and 8-bit ones to 256 levels only.
-@group(0) @binding(4) var shape_noise: texture_3d<f32>; // base shape: Perlin-Worley, three Worley FBMs (passes/noise)
-@group(0) @binding(5) var detail_noise: texture_3d<f32>; // three Worley FBMs (passes/noise)
+@group(0) @binding(4) var shape_noise: texture_3d<f32>; // base shape (passes/noise)
+@group(0) @binding(5) var detail_noise: texture_3d<f32>; // of the edges (passes/noise)
 @group(0) @binding(6) var curl_noise: texture_2d<f32>; // a divergence-free vector in xy (passes/noise)
 @group(0) @binding(7) var weather_map: texture_2d<f32>; // coverage, type, precipitation (passes/weather)
 @group(0) @binding(48) var broad_map: texture_2d<f32>; // shifts of those, and what bends the smaller map (passes/broad_weather)

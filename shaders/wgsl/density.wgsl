@@ -85,12 +85,6 @@ fn profile_from_table(height: f32, kind: f32) -> f32 {
     return textureSampleLevel(profile_table, clamp_sampler, uv, 0.0).r;
 }
 
-// nubis2015: the low-frequency FBM lowers the old minimum, which raises the shape.
-fn base_shape(noise: vec4f) -> f32 {
-    let low = 1.0 - fbm3(noise.gba);
-    return (noise.r + low) / (1.0 + low);
-}
-
 // The base shape with coverage: what is left of it above 1 - coverage, lighter where there is little.
 fn with_coverage(base: f32, coverage: f32) -> f32 {
     return remap01(base, 1.0 - coverage, 1.0) * coverage;
@@ -119,8 +113,9 @@ fn cloud_column(p: vec3f, altitude: f32) -> Column {
         column = rain_below(weather, at, altitude);
     }
     if UPPER {
+        // Within the height of that deck where there is nothing, too: the march reads how much it lacks of being cloud.
         let upper = upper_cloud_at(p, altitude, broad);
-        if upper.limit > column.limit {
+        if upper.limit > column.limit || (column.limit <= 0.0 && upper.height > 0.0 && upper.height < 1.0) {
             return upper;
         }
     }
@@ -260,7 +255,7 @@ fn base_noise(column: Column, width: f32) -> f32 {
     let upper = UPPER && column.medium == UPPER_CLOUD;
     let lod = log2(max(scaled(width, upper) * 128.0 / params.clouds.shape_scale, 1.0));
     let origin = select(frame.shape_origin, frame.upper_shape_origin, upper);
-    return base_shape(textureSampleLevel(shape_noise, repeat_sampler, origin + column.at / params.clouds.shape_scale, lod));
+    return textureSampleLevel(shape_noise, repeat_sampler, origin + column.at / params.clouds.shape_scale, lod).r;
 }
 
 // The base shape where that noise is known.
@@ -309,7 +304,7 @@ fn detail_at(at: vec3f, texels: f32) -> f32 {
 }
 
 fn read_detail(at: vec3f, texels: f32) -> f32 {
-    return fbm3(textureSampleLevel(detail_noise, repeat_sampler, at, log2(max(texels, 1.0))).rgb);
+    return textureSampleLevel(detail_noise, repeat_sampler, at, log2(max(texels, 1.0))).r;
 }
 
 // The density of a medium as a share of `frame.extinction`: of cloud that has been eroded, or of rain, which is not.

@@ -98,3 +98,9 @@ fn worley(p: vec3f, period: u32, salt: u32) -> f32 {
 fn perlin_worley(perlin: f32, worley: f32) -> f32 {
     return remap01(perlin, 1.0 - worley, 1.0);
 }
+
+// nubis2015: the low-frequency FBM lowers the old minimum, which raises the shape.
+fn base_shape(noise: vec4f) -> f32 {
+    let low = 1.0 - fbm3(noise.gba);
+    return (noise.r + low) / (1.0 + low);
+}

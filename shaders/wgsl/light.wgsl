@@ -25,7 +25,10 @@ fn optical_depth_to_sun(p: vec3f, opacity: f32, width: f32) -> f32 {
     let samples = light_samples(p);
     var depth = 0.0;
     // Behind little cloud the near samples see the detail; the others are cheap.
-    let full = select(0u, n, opacity < quality.cheap_light);
+    // So are the farther half of those that spread to where the clouds end: they stand for hundreds of metres, over which the
+    // detail is its mean.
+    let fine = select(n, (n + 1u) / 2u, samples.rate > 0.0);
+    let full = select(0u, fine, opacity < quality.cheap_light);
     // Loops are tested at their end: one that is tested at its start runs once more on lavapipe.
     var i = 0u;
     if LIGHT_DETAIL && full > 0u {

@@ -400,16 +400,34 @@ impl Gpu {
         })
     }
 
-    /// A flat square texture of one half-float channel, to be filled from a buffer.
-    pub(crate) fn map(&self, label: &str, size: u32) -> wgpu::Texture {
+    /// A flat square texture of one or two half-float channels, to be filled from a buffer.
+    pub(crate) fn map(&self, label: &str, size: u32, format: wgpu::TextureFormat) -> wgpu::Texture {
         self.device.create_texture(&wgpu::TextureDescriptor {
             label: Some(label),
             size: wgpu::Extent3d { width: size, height: size, depth_or_array_layers: 1 },
             mip_level_count: 1,
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
+            format,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING
+                | wgpu::TextureUsages::COPY_SRC
+                | wgpu::TextureUsages::COPY_DST,
+            view_formats: &[],
+        })
+    }
+
+    /// A cube of one half-float channel with all its mips, to be filled from buffers.
+    pub(crate) fn noise_volume(&self, label: &str, size: u32) -> wgpu::Texture {
+        self.device.create_texture(&wgpu::TextureDescriptor {
+            label: Some(label),
+            size: wgpu::Extent3d { width: size, height: size, depth_or_array_layers: size },
+            mip_level_count: size.ilog2() + 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D3,
             format: wgpu::TextureFormat::R16Float,
-            usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING
+                | wgpu::TextureUsages::COPY_SRC
+                | wgpu::TextureUsages::COPY_DST,
             view_formats: &[],
         })
     }
@@ -566,12 +584,15 @@ impl Work<'_> {
         self.encoder.clear_buffer(buffer, 0, None);
     }
 
-    /// Fills a texture of [`Gpu::map`] from a buffer, whose rows are padded to whole 256 bytes.
-    pub fn fill(&mut self, texture: &wgpu::Texture, texels: &wgpu::Buffer) {
-        let bytes_per_row = Some((2 * texture.width()).next_multiple_of(256));
-        let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row, rows_per_image: Some(texture.height()) };
+    /// Fills a mip of a texture of half floats from a buffer, whose rows are padded to whole 256 bytes.
+    pub fn fill(&mut self, texture: &wgpu::Texture, mip_level: u32, texels: &wgpu::Buffer) {
+        let size = texture.size().mip_level_size(mip_level, texture.dimension());
+        let texel = texture.format().block_copy_size(None).unwrap_or(8);
+        let bytes_per_row = Some((texel * size.width).next_multiple_of(256));
+        let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row, rows_per_image: Some(size.height) };
         let source = wgpu::TexelCopyBufferInfo { buffer: texels, layout };
-        self.encoder.copy_buffer_to_texture(source, texture.as_image_copy(), texture.size());
+        let target = wgpu::TexelCopyTextureInfo { mip_level, ..texture.as_image_copy() };
+        self.encoder.copy_buffer_to_texture(source, target, size);
     }
 
     /// Brings `bytes` of a buffer back; [`Work::submit`] returns them in the order of the calls.
@@ -636,10 +657,11 @@ fn mips(
     texture: &wgpu::Texture,
 ) -> impl Iterator<Item = (wgpu::TexelCopyTextureInfo<'_>, wgpu::TexelCopyBufferLayout, wgpu::Extent3d)> {
     let mut end = 0;
+    let texel = texture.format().block_copy_size(None).unwrap_or(8);
     (0..texture.mip_level_count()).map(move |mip_level| {
         let size = texture.size().mip_level_size(mip_level, texture.dimension());
         // Rows that are downloaded begin at multiples of 256 bytes.
-        let row = (8 * size.width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let row = (texel * size.width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
         let offset = end;
         end += u64::from(row) * u64::from(size.height) * u64::from(size.depth_or_array_layers);
         let layout =

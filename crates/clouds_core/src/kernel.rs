@@ -132,7 +132,9 @@ impl Variant {
             beams: false,
             scene: false,
             light_detail: quality.cheap_light > 0.0,
-            light_cheap: quality.cheap_light < 1.0 || quality.far_sample,
+            light_cheap: quality.cheap_light < 1.0
+                || quality.far_sample
+                || (quality.light_distance <= 0.0 && !quality.sun_volume),
             // What single passes ask for beside.
             camera: 0,
             high: false,

@@ -341,16 +341,16 @@ params! {
     /// The numerical method: how accurately a sky is computed, never how it looks.
     Quality {
         /// View steps straight up.
-        steps_zenith: u32 = 80, in 1..=4096 "";
+        steps_zenith: u32 = 134, in 1..=4096 "";
         /// View steps toward the horizon.
-        steps_horizon: u32 = 192, in 1..=4096 "";
+        steps_horizon: u32 = 320, in 1..=4096 "";
         /// How much steps grow with distance: 0 makes all of a ray's steps equal, 1 lets a step be a fixed share of its distance.
         step_growth: f32 = 1.0, in 0..=1 "";
         /// How many steps one step outside cloud is long; on a hit the march goes back.
-        big_step: u32 = 3, in 1..=16 "";
+        big_step: u32 = 5, in 1..=16 "";
         /// How far a ray may leap through clear air, beyond `big_step`: as a share of `clouds.shape_scale` (of
         /// `weather.scale` or two and a half pixels of `weather.map`, if that is less) for each unit that the base shape lacks of being cloud. On a hit the march goes back. 0 leaps no
-        /// farther than `big_step`; none does where that is 1, in grids, with rain in sight and with a second deck.
+        /// farther than `big_step`; none does where that is 1, in grids and with rain in sight.
         leap: f32 = 0.2, in 0..=1 "";
         /// Full samples of zero in a row after which samples are cheap again (nubis2015: 6).
         empty_samples: u32 = 6, in 1..=4096 "";
@@ -358,7 +358,7 @@ params! {
         light_steps: u32 = 16, in 1..=128 "";
         /// Share of a pixel's cloud that is lit as one, by the light samples of one place in it: samples in a row are lit
         /// together once they have gathered more. 0 lights each sample by itself.
-        light_share: f32 = 0.1, in 0..=1 "";
+        light_share: f32 = 0.15, in 0..=1 "";
         /// Whether the light samples stay within two cells of a volume, baked around the eye, of sunlight through the clouds,
         /// and the rest is read there. Not in a grid.
         sun_volume: bool = false;
@@ -684,8 +684,10 @@ impl Quality {
         Ok(match name {
             "balanced" => balanced,
             "draft" => Self {
-                steps_zenith: 54,
-                steps_horizon: 128,
+                steps_zenith: 80,
+                steps_horizon: 192,
+                big_step: 3,
+                light_steps: 10,
                 min_transmittance: 0.03,
                 contrast: 0.5,
                 path_samples: 16,
@@ -694,6 +696,7 @@ impl Quality {
             "high" => Self {
                 steps_zenith: 192,
                 steps_horizon: 512,
+                big_step: 3,
                 light_steps: 48,
                 light_share: 0.01,
                 min_transmittance: 0.002,
@@ -723,8 +726,8 @@ impl Quality {
     pub fn check(&self) -> Result<()> {
         check_block("quality", self)?;
         // lavapipe ends loops without a word after 65,535 iterations summed over a shader (docs/numerics.md).
-        // Growing steps may be twice as many (passes/march.wgsl).
-        let steps = self.steps_zenith.max(self.steps_horizon) * if self.step_growth > 0.0 { 2 } else { 1 };
+        // Growing steps may be three times as many (passes/march.wgsl).
+        let steps = self.steps_zenith.max(self.steps_horizon) * if self.step_growth > 0.0 { 3 } else { 1 };
         // What is lit as one has gathered more than its share; the rest of the ray is one more.
         let groups = (1.0 / self.light_share + 1.0).min(steps as f32) as u32;
         let turns = 2 * steps + groups * (1 + self.light_steps);

@@ -67,6 +67,9 @@ struct Steps {
     equal: f32, // all of them, where they do not, m
 }
 
+// How many times the steps a ray through two decks gets.
+const TWO_DECKS = 1.5;
+
 fn ray_steps(start: f32, length: f32, direction: vec3f) -> Steps {
     let slant = 1.0 - abs(dot(direction, frame.zenith));
     let count = mix(f32(quality.steps_zenith), f32(quality.steps_horizon), slant);
@@ -77,7 +80,9 @@ fn ray_steps(start: f32, length: f32, direction: vec3f) -> Steps {
     // A ray from inside the clouds, or from just above them, has to cover many more distances than one from the ground:
     // it gets up to twice the steps, or its far clouds are grain.
     let reach = log(1.0 + growth * length);
-    let steps = round(count * clamp(sqrt(reach), 1.0, 2.0));
+    // So has one through two decks: with as many steps as through one, those of `two_decks` err by a half more.
+    let decks = select(1.0, TWO_DECKS, UPPER && growth > 0.0);
+    let steps = round(count * decks * clamp(sqrt(reach), 1.0, 2.0));
     let each = reach / steps;
     // exp(each) - 1 with all its digits.
     let ratio = each * exp(each) * one_minus_exp_over(each);
@@ -146,6 +151,14 @@ fn step_index(steps: Steps, distance: f32) -> f32 {
     return log2(1.0 + steps.growth * distance) / steps.scale;
 }
 
+// How many steps take a way, the first of them of a given length.
+fn steps_over(steps: Steps, way: f32, length: f32) -> f32 {
+    if steps.growth == 0.0 {
+        return way / length;
+    }
+    return log2(1.0 + way / length * steps.ratio) / steps.scale;
+}
+
 // How far a ray may leap through clear air for each unit that the base shape lacks of being cloud.
 struct Leaps {
     reach: f32, // m
@@ -156,23 +169,48 @@ struct Leaps {
 // in `above`; a sixteenth takes as many samples as an eighth.
 const PROFILE_SLOPE = 8.0;
 
-fn ray_leaps(direction: vec3f) -> Leaps {
-    let reach = quality.leap * frame.leap_scale;
-    let thickness = params.clouds.top - params.clouds.base;
+fn ray_leaps(direction: vec3f, medium: u32) -> Leaps {
+    var reach = quality.leap * frame.leap_scale;
+    var thickness = params.clouds.top - params.clouds.base;
+    if UPPER && medium == UPPER_CLOUD {
+        reach *= params.upper_clouds.scale;
+        thickness = params.upper_clouds.top - params.upper_clouds.base;
+    }
     return Leaps(reach, 1.0 + PROFILE_SLOPE * abs(dot(direction, frame.zenith)) * reach / thickness);
 }
 
 // The steps from a point without cloud to where to look next: `big_step` of them, or more the more the shape lacks, as the
 // noise changes no faster than so much in a metre (Hart 1996, "sphere tracing", with a slope that is measured, not a bound).
 // Its threshold is what the profile lets through, here and, with none, at any height. Not where another medium may be.
-fn steps_to_next(leaps: Leaps, column: Column, noise: f32, step: f32) -> u32 {
+fn steps_to_next(steps: Steps, direction: vec3f, column: Column, noise: f32, at: Sample) -> u32 {
     let big = f32(quality.big_step);
-    if VOLUME || UPPER || RAIN_SHAFTS {
+    if VOLUME || RAIN_SHAFTS {
         return quality.big_step;
     }
+    let leaps = ray_leaps(direction, column.medium);
     let lacks = 1.0 - column.coverage - noise * vec2f(1.0, column.profile);
-    let way = leaps.reach * max(lacks.x, lacks.y / leaps.rise);
-    return u32(clamp(way / step, big, 1.0 + LONGEST_LEAP * (big - 1.0)));
+    var way = leaps.reach * max(lacks.x, lacks.y / leaps.rise);
+    if UPPER {
+        way = way_to_decks(direction, way, at);
+    }
+    return u32(clamp(steps_over(steps, way, at.length), big, 1.0 + LONGEST_LEAP * (big - 1.0)));
+}
+
+// A leap within a deck, no farther than to the other one; between both, all the way there.
+fn way_to_decks(direction: vec3f, leap: f32, at: Sample) -> f32 {
+    let lower_top = select(params.clouds.top, tallest(), RAINY);
+    let over = at.altitude - lower_top;
+    let under = params.upper_clouds.base - at.altitude;
+    // Rays bend away from the ground: by less than this within a leap.
+    const BEND_OF_LEAP = 1e-3;
+    let mu = cos_zenith_along(direction, at.t, at.altitude);
+    let way = max(select(over, under, mu > 0.0), 0.0) / (abs(mu) + BEND_OF_LEAP);
+    if over > 0.0 && under > 0.0 {
+        return way;
+    }
+    // Towers may reach into the deck above: there neither is alone.
+    let alone = select(leap, 0.0, over <= 0.0 && under <= 0.0);
+    return select(alone, min(alone, way), way > 0.0);
 }
 
 // Steps for each that a big step leaps over: where those leap over none, nothing does.
@@ -198,7 +236,6 @@ fn march_ray(direction: vec3f, limit: f32, offset: f32, within: vec2f) -> Cloud 
     var sum = Gathered();
 
     let big = quality.big_step;
-    let leaps = ray_leaps(direction);
     // Measured on `fair_weather`: one big step of slack errs by 6 %, 4 by 2 %, 8 as little as all of the ray, in 3 % more time.
     let slack = f32(8u * big);
     let end = u32(clamp(step_index(steps, within.y) + slack, 0.0, f32(steps.count)));
@@ -215,7 +252,7 @@ fn march_ray(direction: vec3f, limit: f32, offset: f32, within: vec2f) -> Cloud 
             i = max(i - min(i, leapt - 1u), seen);
             break;
         }
-        leapt = steps_to_next(leaps, column, noise, at.length);
+        leapt = steps_to_next(steps, direction, column, noise, at);
         i += leapt;
         if i >= end {
             break;
@@ -247,7 +284,7 @@ fn march_ray(direction: vec3f, limit: f32, offset: f32, within: vec2f) -> Cloud 
             if full {
                 density = cloud_density(column, shape, at.width);
             }
-            leapt = steps_to_next(leaps, column, noise, at.length);
+            leapt = steps_to_next(steps, direction, column, noise, at);
             empty = select(empty + 1u, 0u, density > 0.0 || (hit && searching));
             i = select(i + select(1u, leapt, searching && !hit), back, hit && !full);
             seen = select(seen, i, full || !searching);

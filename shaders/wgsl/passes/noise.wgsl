@@ -17,7 +17,7 @@ fn stretched(worley: f32) -> f32 {
     return remap01(worley, 0.2, 0.75);
 }
 
-// 128^3: R Perlin-Worley; G, B, A Worley FBMs of rising frequency, dark at the feature points, as the sampler's
+// 128^3, the base shape of four noises: R Perlin-Worley; G, B, A Worley FBMs of rising frequency, dark at the feature points, as the sampler's
 // remap(R, -(1 - fbm(GBA)), 1, 0, 1) wants them. The five Worley octaves are computed once and shared.
 // vsu2022: Perlin-Worley of rising frequency in all four, G, B, A in the same sense.
 @compute @workgroup_size(4, 4, 4)
@@ -42,10 +42,10 @@ fn shape(@builtin(global_invocation_id) id: vec3u) {
         texel.b = 1.0 - perlin_worley(perlin_fbm(p, 12u, 3u, seed + PERLIN_SALT + 9u), b);
         texel.a = 1.0 - perlin_worley(perlin_fbm(p, 24u, 2u, seed + PERLIN_SALT + 12u), a);
     }
-    textureStore(volume_out, id, texel);
+    textureStore(volume_out, id, vec4f(base_shape(texel)));
 }
 
-// 32^3: Worley FBMs of rising frequency in R, G, B; Perlin-Worley in all of them for vsu2022.
+// 32^3, the sum of three noises: Worley FBMs of rising frequency in R, G, B; Perlin-Worley in all of them for vsu2022.
 @compute @workgroup_size(4, 4, 4)
 fn detail(@builtin(global_invocation_id) id: vec3u) {
     let size = textureDimensions(volume_out);
@@ -68,7 +68,7 @@ fn detail(@builtin(global_invocation_id) id: vec3u) {
             texel[i] = perlin_worley(perlin_fbm(p, 2u << i, 3u, seed + 4u + i), texel[i]);
         }
     }
-    textureStore(volume_out, id, vec4f(texel, 1.0));
+    textureStore(volume_out, id, vec4f(fbm3(texel)));
 }
 
 fn curl_potential(p: vec2f, seed: u32) -> f32 {
@@ -78,17 +78,29 @@ fn curl_potential(p: vec2f, seed: u32) -> f32 {
 // 128^2: the curl of a potential, which has no divergence: it swirls and never gathers (Bridson 2007). About -1 to 1.
 @compute @workgroup_size(8, 8)
 fn curl(@builtin(global_invocation_id) id: vec3u) {
-    let size = textureDimensions(map_out);
-    if any(id.xy >= size) {
+    const SIZE = 128u;
+    if any(id.xy >= vec2u(SIZE)) {
         return;
     }
-    let p = (vec2f(id.xy) + 0.5) / vec2f(size);
+    let p = (vec2f(id.xy) + 0.5) / f32(SIZE);
     let seed = params.clouds.seed * 131u + CURL_SALT;
-    let e = 0.5 / f32(size.x);
+    const e = 0.5 / f32(SIZE);
     let dx = curl_potential(p + vec2f(e, 0.0), seed) - curl_potential(p - vec2f(e, 0.0), seed);
     let dy = curl_potential(p + vec2f(0.0, e), seed) - curl_potential(p - vec2f(0.0, e), seed);
     // A slope of 5 a tile is about the largest that three octaves from 4 cells up reach.
-    textureStore(map_out, id.xy, vec4f(vec2f(dy, -dx) / (2.0 * e) / 5.0, 0.0, 1.0));
+    texels_out[id.y * SIZE + id.x] = pack2x16float(vec2f(dy, -dx) / (2.0 * e) / 5.0);
+}
+
+// A volume as half floats of one channel, two in each word, in rows of 128 or more.
+@compute @workgroup_size(64)
+fn pack(@builtin(global_invocation_id) id: vec3u) {
+    let size = textureDimensions(volume_in);
+    if any(id * vec3u(2u, 1u, 1u) >= size) {
+        return;
+    }
+    let at = vec3u(2u * id.x, id.yz);
+    let pair = vec2f(textureLoad(volume_in, at, 0).r, textureLoad(volume_in, at + vec3u(1u, 0u, 0u), 0).r);
+    texels_out[(id.z * size.y + id.y) * max(size.x, 128u) / 2u + id.x] = pack2x16float(pair);
 }
 
 // Half the size, each texel the mean of eight: wgpu makes no mips of volumes.

@@ -37,7 +37,7 @@ impl HighClouds {
             // One channel: with four, three of them for nothing, it drops out of the cache of a core (reading it took
             // composite 24 ms at 1080p on a busy machine, not 16). Such a texture cannot be stored to, so it is filled
             // from a buffer.
-            let texture = ctx.gpu.map("high_clouds", size);
+            let texture = ctx.gpu.map("high_clouds", size, wgpu::TextureFormat::R16Float);
             let texels = ctx.gpu.buffer("high_clouds", u64::from(2 * size.next_multiple_of(128) * size));
             let mut work = ctx.gpu.work();
             if high.coverage > 0.0 {
@@ -45,7 +45,7 @@ impl HighClouds {
                 let kernel = ctx.gpu.kernel("high_clouds", kernel(high), ctx.variant)?;
                 work.dispatch(&kernel, &bindings, [size.div_ceil(2), size, 1])?;
             }
-            work.fill(&texture, &texels);
+            work.fill(&texture, 0, &texels);
             work.submit(ctx.timings, ctx.interrupt)?;
             Ok(texture.create_view(&wgpu::TextureViewDescriptor::default()))
         })?;

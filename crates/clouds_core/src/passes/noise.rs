@@ -30,14 +30,13 @@ impl Noise {
         if let Some(noise) = shared.as_ref().filter(|noise| noise.key == key) {
             return Ok(noise.clone());
         }
-        let volume = |label, size: u32| ctx.gpu.texture(label, [size; 3], size.ilog2() + 1);
-        let shape = volume("shape", SHAPE_SIZE);
-        let detail = volume("detail", DETAIL_SIZE);
-        let curl = ctx.gpu.texture("curl", [CURL_SIZE, CURL_SIZE, 1], 1);
+        let shape = ctx.gpu.noise_volume("shape", SHAPE_SIZE);
+        let detail = ctx.gpu.noise_volume("detail", DETAIL_SIZE);
+        let curl = ctx.gpu.map("curl", CURL_SIZE, wgpu::TextureFormat::Rg16Float);
         kept(ctx, "noise", &format!("{key:?}"), &[&shape, &detail, &curl], |ctx| {
             bake_volume(ctx, "shape", &shape)?;
             bake_volume(ctx, "detail", &detail)?;
-            super::weather::bake_map(ctx, "noise", "curl", &curl)
+            bake_curl(ctx, &curl)
         })?;
         let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
         let noise = Arc::new(Self { key, shape: view(&shape), detail: view(&detail), curl: view(&curl) });
@@ -54,9 +53,21 @@ impl Noise {
     }
 }
 
-/// Bakes a volume with the kernel `entry`, and its mips from it.
-fn bake_volume(ctx: &mut Context<'_>, entry: &str, texture: &wgpu::Texture) -> Result<()> {
-    let size = texture.width();
+fn bake_curl(ctx: &mut Context<'_>, target: &wgpu::Texture) -> Result<()> {
+    let texels = ctx.gpu.buffer("curl", u64::from(4 * CURL_SIZE * CURL_SIZE));
+    let bindings = [ctx.uniforms.bindings(), vec![("texels_out", (&texels).into())]].concat();
+    let mut work = ctx.gpu.work();
+    work.dispatch(&*ctx.gpu.kernel("noise", "curl", ctx.variant)?, &bindings, [CURL_SIZE, CURL_SIZE, 1])?;
+    work.fill(target, 0, &texels);
+    work.submit(ctx.timings, ctx.interrupt)?;
+    Ok(())
+}
+
+/// Bakes a volume with the kernel `entry`, and its mips from it, into a texture of one channel: with four, as the sources
+/// have it, reading them took a good third of the march on lavapipe. Such a texture cannot be stored to.
+fn bake_volume(ctx: &mut Context<'_>, entry: &str, target: &wgpu::Texture) -> Result<()> {
+    let size = target.width();
+    let texture = ctx.gpu.texture(entry, [size; 3], target.mip_level_count());
     let mip = |level: u32| {
         texture.create_view(&wgpu::TextureViewDescriptor {
             base_mip_level: level,
@@ -74,6 +85,14 @@ fn bake_volume(ctx: &mut Context<'_>, entry: &str, texture: &wgpu::Texture) -> R
         let (from, to) = (mip(level - 1), mip(level));
         let bindings = [("volume_in", (&from).into()), ("volume_out", (&to).into())];
         work.dispatch(&downsample, &bindings, [size >> level; 3])?;
+    }
+    let pack = ctx.gpu.kernel("noise", "pack", ctx.variant)?;
+    for level in 0..texture.mip_level_count() {
+        let (from, size) = (mip(level), size >> level);
+        let texels = ctx.gpu.buffer("packed", u64::from(2 * size.next_multiple_of(128) * size * size));
+        let bindings = [("volume_in", (&from).into()), ("texels_out", (&texels).into())];
+        work.dispatch(&pack, &bindings, [size.div_ceil(2), size, size])?;
+        work.fill(target, level, &texels);
     }
     work.submit(ctx.timings, ctx.interrupt)?;
     Ok(())

@@ -169,6 +169,11 @@ fn tallest() -> f32 {
     return max(params.clouds.top, params.clouds.cumulonimbus_top);
 }
 
+// Altitude above which nothing of the first deck is.
+fn lower_top() -> f32 {
+    return select(params.clouds.top, tallest(), RAINY);
+}
+
 // Between which heights of the whole cloud its anvil rises to full strength and falls back.
 const ANVIL = vec4f(0.64, 0.80, 0.88, 1.0);
 

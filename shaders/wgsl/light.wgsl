@@ -66,25 +66,40 @@ const NEAR_CELLS = 2.0;
 struct LightSamples {
     reach: f32,
     rate: f32, // of the logarithm for each sample; 0 for squares
+    near: u32, // how many of them lie so; the others, evenly in the deck above
+    above: vec2f, // where that begins and ends, m
 }
 
 // m: light is lost in the first tens of metres or not for kilometres.
 const NEAR = 150.0;
 
 fn light_samples(p: vec3f) -> LightSamples {
+    let n = quality.light_steps;
     if SUN_VOLUME {
-        return LightSamples(NEAR_CELLS * level_cell(level_at(p.xy)), 0.0);
+        return LightSamples(NEAR_CELLS * level_cell(level_at(p.xy)), 0.0, n, vec2f(0.0));
     }
     if quality.light_distance > 0.0 {
-        return LightSamples(quality.light_distance, 0.0);
+        return LightSamples(quality.light_distance, 0.0, n, vec2f(0.0));
     }
     let s = cloud_stretches_from(p, frame.sun_direction);
-    let reach = s.start + s.first + s.gap + s.second;
-    return LightSamples(reach, log2(1.0 + reach / NEAR) / f32(quality.light_steps));
+    var reach = s.start + s.first + s.gap + s.second;
+    var near = n;
+    var above = vec2f(0.0);
+    if UPPER && n >= 3u && altitude_at(p) < lower_top() && lower_top() <= params.upper_clouds.base {
+        // A third of the samples: of those as long as they are far, one or none would meet that deck. With them, `draft` errs by
+        // 26 % in `two_decks`, not 14.
+        near = n - n / 3u;
+        above = vec2f(hit_sphere_from(p, frame.sun_direction, params.upper_clouds.base).far, reach);
+        reach = hit_sphere_from(p, frame.sun_direction, lower_top()).far;
+    }
+    return LightSamples(reach, log2(1.0 + reach / NEAR) / f32(near), near, above);
 }
 
 // Where the stretch of a sample begins, m.
 fn light_stretch(samples: LightSamples, i: f32) -> f32 {
+    if UPPER && i > f32(samples.near) {
+        return mix(samples.above.x, samples.above.y, (i - f32(samples.near)) / f32(quality.light_steps - samples.near));
+    }
     if samples.rate > 0.0 {
         return NEAR * (exp2(samples.rate * i) - 1.0);
     }
@@ -100,7 +115,7 @@ struct LightSample {
 }
 
 fn light_sample(samples: LightSamples, p: vec3f, i: u32, width: f32) -> LightSample {
-    let a = light_stretch(samples, f32(i));
+    let a = select(light_stretch(samples, f32(i)), samples.above.x, UPPER && i == samples.near);
     let b = light_stretch(samples, f32(i + 1u));
     let reach = samples.reach;
     let is_far = i == quality.light_steps;

@@ -198,8 +198,7 @@ fn steps_to_next(steps: Steps, direction: vec3f, column: Column, noise: f32, at:
 
 // A leap within a deck, no farther than to the other one; between both, all the way there.
 fn way_to_decks(direction: vec3f, leap: f32, at: Sample) -> f32 {
-    let lower_top = select(params.clouds.top, tallest(), RAINY);
-    let over = at.altitude - lower_top;
+    let over = at.altitude - lower_top();
     let under = params.upper_clouds.base - at.altitude;
     // Rays bend away from the ground: by less than this within a leap.
     const BEND_OF_LEAP = 1e-3;

@@ -48,7 +48,7 @@ def _resolution(base: str, divisor: int) -> Method:
 def full() -> list[Method]:
     """All methods. A family's coarsest setting comes first; `finest` knows the last."""
     found = [Method(name=p, family=p, value=0, quality=nubis.quality(p)) for p in PRESETS]
-    found += [_view_steps("balanced", n) for n in (24, 48, 96, 192, 384, 768, 1536)]
+    found += [_view_steps("balanced", n) for n in (20, 40, 80, 160, 320, 640, 1280)]
     found += [_view_steps("high", n) for n in (32, 64, 128, 256, 512)]
     found += [_light_steps("balanced", n) for n in (1, 2, 4, 8, 16, 32, 64)]
     found += [_light_steps("high", n) for n in (1, 2, 4, 8, 16, 32)]

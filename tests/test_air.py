@@ -181,7 +181,13 @@ def dusk(make, step):
     return np.array(changes)
 
 
-DUSK = {"contrast": 0.0, "light_steps": 96, "light_share": 0.0}
+DUSK = {
+    "contrast": 0.0,
+    "steps_zenith": 80,
+    "steps_horizon": 192,
+    "light_steps": 96,
+    "light_share": 0.0,
+}
 
 
 def test_dusk_does_not_pop():

@@ -504,7 +504,9 @@ class Quality(Block):
         Full samples of zero in a row after which samples are cheap again (nubis2015: 6). Allowed: a
         whole number from 1 to 4096.
     light_steps : int
-        Light samples toward the sun, besides the far one. Allowed: a whole number from 1 to 128.
+        Light samples toward the sun, besides the far one. Where they spread to the end of the
+        clouds, a third of them is for a second deck above the point. Allowed: a whole number from 1
+        to 128.
     light_share : float
         Share of a pixel's cloud that is lit as one, by the light samples of one place in it:
         samples in a row are lit together once they have gathered more. 0 lights each sample by
@@ -524,7 +526,8 @@ class Quality(Block):
         (nubis2015); 0 looks straight at the sun. Allowed: a number from 0 to 1.
     cheap_light : float
         Opacity in front of a sample past which its light samples leave out the detail (nubis2015:
-        0.3). Allowed: a number from 0 to 1.
+        0.3). The farther half of those that spread to the end of the clouds leaves it out always.
+        Allowed: a number from 0 to 1.
     min_transmittance : float
         Transmittance at which a ray ends; what is left is scaled away, not lost. Allowed: a number
         from 0 to 0.5.

@@ -15,7 +15,7 @@ use crate::gpu::{AdapterInfo, lock};
 
 /// How every file begins: whose it is. One that begins otherwise is not read.
 const MAGIC: &str = concat!("nubis ", env!("CARGO_PKG_VERSION"), ", format 1\n");
-/// Most files of a kind in the folder, 20 MB each where they are noise; the one that was used last longest ago goes first.
+/// Most files of a kind in the folder, 6 MB each where they are noise; the one that was used last longest ago goes first.
 /// A process stores no more either, so that a data set of thousands of seeds does not write all of them.
 const KEPT: usize = 8;
 /// Bytes of pipelines from which on none are loaded: they grow with each change of the shaders, and are never pruned.

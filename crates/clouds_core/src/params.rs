@@ -354,7 +354,8 @@ params! {
         leap: f32 = 0.2, in 0..=1 "";
         /// Full samples of zero in a row after which samples are cheap again (nubis2015: 6).
         empty_samples: u32 = 6, in 1..=4096 "";
-        /// Light samples toward the sun, besides the far one.
+        /// Light samples toward the sun, besides the far one. Where they spread to the end of the clouds, a third of them is
+        /// for a second deck above the point.
         light_steps: u32 = 16, in 1..=128 "";
         /// Share of a pixel's cloud that is lit as one, by the light samples of one place in it: samples in a row are lit
         /// together once they have gathered more. 0 lights each sample by itself.
@@ -369,7 +370,8 @@ params! {
         /// Half width of the cone that the light samples are spread over, as a share of its length (nubis2015); 0 looks
         /// straight at the sun.
         cone: f32 = 0.0, in 0..=1 "";
-        /// Opacity in front of a sample past which its light samples leave out the detail (nubis2015: 0.3).
+        /// Opacity in front of a sample past which its light samples leave out the detail (nubis2015: 0.3). The farther half
+        /// of those that spread to the end of the clouds leaves it out always.
         cheap_light: f32 = 1.0, in 0..=1 "";
         /// Transmittance at which a ray ends; what is left is scaled away, not lost.
         min_transmittance: f32 = 0.01, in 0..=0.5 "";
@@ -726,8 +728,8 @@ impl Quality {
     pub fn check(&self) -> Result<()> {
         check_block("quality", self)?;
         // lavapipe ends loops without a word after 65,535 iterations summed over a shader (docs/numerics.md).
-        // Growing steps may be three times as many (passes/march.wgsl).
-        let steps = self.steps_zenith.max(self.steps_horizon) * if self.step_growth > 0.0 { 3 } else { 1 };
+        // Growing steps may be twice as many (passes/march.wgsl).
+        let steps = self.steps_zenith.max(self.steps_horizon) * if self.step_growth > 0.0 { 2 } else { 1 };
         // What is lit as one has gathered more than its share; the rest of the ray is one more.
         let groups = (1.0 / self.light_share + 1.0).min(steps as f32) as u32;
         let turns = 2 * steps + groups * (1 + self.light_steps);

@@ -67,7 +67,7 @@ struct Steps {
     equal: f32, // all of them, where they do not, m
 }
 
-// How many times the steps a ray through two decks gets.
+// How many times the steps a ray through two decks gets, within the twice that the longest get.
 const TWO_DECKS = 1.5;
 
 fn ray_steps(start: f32, length: f32, direction: vec3f) -> Steps {
@@ -80,9 +80,9 @@ fn ray_steps(start: f32, length: f32, direction: vec3f) -> Steps {
     // A ray from inside the clouds, or from just above them, has to cover many more distances than one from the ground:
     // it gets up to twice the steps, or its far clouds are grain.
     let reach = log(1.0 + growth * length);
-    // So has one through two decks: with as many steps as through one, those of `two_decks` err by a half more.
+    // So does one through two decks: with as many steps as through one, those of `two_decks` err by a half more.
     let decks = select(1.0, TWO_DECKS, UPPER && growth > 0.0);
-    let steps = round(count * decks * clamp(sqrt(reach), 1.0, 2.0));
+    let steps = round(count * clamp(decks * sqrt(reach), 1.0, 2.0));
     let each = reach / steps;
     // exp(each) - 1 with all its digits.
     let ratio = each * exp(each) * one_minus_exp_over(each);

@@ -64,7 +64,7 @@ fn bake_curl(ctx: &mut Context<'_>, target: &wgpu::Texture) -> Result<()> {
 }
 
 /// Bakes a volume with the kernel `entry`, and its mips from it, into a texture of one channel: with four, as the sources
-/// have it, reading them took a good third of the march on lavapipe. Such a texture cannot be stored to.
+/// have it, reading took lavapipe a quarter of a frame, not a seventh. Such a texture cannot be stored to.
 fn bake_volume(ctx: &mut Context<'_>, entry: &str, target: &wgpu::Texture) -> Result<()> {
     let size = target.width();
     let texture = ctx.gpu.texture(entry, [size; 3], target.mip_level_count());

@@ -526,8 +526,8 @@ class Quality(Block):
         (nubis2015); 0 looks straight at the sun. Allowed: a number from 0 to 1.
     cheap_light : float
         Opacity in front of a sample past which its light samples leave out the detail (nubis2015:
-        0.3). The farther half of those that spread to the end of the clouds leaves it out always.
-        Allowed: a number from 0 to 1.
+        0.3). Of those that spread to the end of the clouds, the ones that stand for most of a tile
+        of the detail leave it out always. Allowed: a number from 0 to 1.
     min_transmittance : float
         Transmittance at which a ray ends; what is left is scaled away, not lost. Allowed: a number
         from 0 to 0.5.

@@ -25,9 +25,8 @@ fn optical_depth_to_sun(p: vec3f, opacity: f32, width: f32) -> f32 {
     let samples = light_samples(p);
     var depth = 0.0;
     // Behind little cloud the near samples see the detail; the others are cheap.
-    // So are the farther half of those that spread to where the clouds end: they stand for hundreds of metres, over which the
-    // detail is its mean.
-    let fine = select(n, (n + 1u) / 2u, samples.rate > 0.0);
+    // So are those that stand for most of a tile of the detail, over which it is its mean.
+    let fine = detailed_samples(samples);
     let full = select(0u, fine, opacity < quality.cheap_light);
     // Loops are tested at their end: one that is tested at its start runs once more on lavapipe.
     var i = 0u;
@@ -93,6 +92,17 @@ fn light_samples(p: vec3f) -> LightSamples {
         reach = hit_sphere_from(p, frame.sun_direction, lower_top()).far;
     }
     return LightSamples(reach, log2(1.0 + reach / NEAR) / f32(near), near, above);
+}
+
+// How many samples, from the first on, stand for less than most of a tile of the detail.
+fn detailed_samples(samples: LightSamples) -> u32 {
+    let most = 0.875 * params.clouds.detail_scale;
+    let above = (samples.above.y - samples.above.x) / f32(max(quality.light_steps - samples.near, 1u));
+    if samples.rate <= 0.0 || (UPPER && samples.near < quality.light_steps && above < most) {
+        return quality.light_steps;
+    }
+    let first = NEAR * (exp2(samples.rate) - 1.0);
+    return u32(clamp(ceil(log2(max(most / first, 1.0)) / samples.rate), 0.0, f32(samples.near)));
 }
 
 // Where the stretch of a sample begins, m.

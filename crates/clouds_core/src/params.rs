@@ -370,8 +370,8 @@ params! {
         /// Half width of the cone that the light samples are spread over, as a share of its length (nubis2015); 0 looks
         /// straight at the sun.
         cone: f32 = 0.0, in 0..=1 "";
-        /// Opacity in front of a sample past which its light samples leave out the detail (nubis2015: 0.3). The farther half
-        /// of those that spread to the end of the clouds leaves it out always.
+        /// Opacity in front of a sample past which its light samples leave out the detail (nubis2015: 0.3). Of those
+        /// that spread to the end of the clouds, the ones that stand for most of a tile of the detail leave it out always.
         cheap_light: f32 = 1.0, in 0..=1 "";
         /// Transmittance at which a ray ends; what is left is scaled away, not lost.
         min_transmittance: f32 = 0.01, in 0..=0.5 "";

@@ -116,9 +116,7 @@ def _against(found: Row) -> str:
     named = ["the same, of `draft` and `balanced` alone"]
     for name in names:
         means.append(_mean([row["ratio"] for row in ratios if row["published"] == name]))
-        named.append(
-            _mean([_of_named(times, scene, name) for scene in dict.fromkeys(s for s, _ in times)])
-        )
+        named.append(_mean([row["named_ratio"] for row in ratios if row["published"] == name]))
     heads = list(dict.fromkeys(m for _, m in times if m not in names))
     ours = []
     for scene in dict.fromkeys(s for s, _ in times):
@@ -135,14 +133,6 @@ def _against(found: Row) -> str:
 def _mean(ratios: list[float | None]) -> str:
     known = [ratio for ratio in ratios if ratio]
     return f"**{np.exp(np.mean(np.log(known))):.1f}×** over {len(known)} scenes" if known else "–"
-
-
-def _of_named(times: dict[tuple[str, str], Row], scene: str, published: str) -> float | None:
-    """How many times faster than a published method the fastest of these is that errs no more."""
-    theirs = times[scene, published]
-    ours = [times[scene, name] for name in ("draft", "balanced")]
-    seconds = [row["processor_seconds"] for row in ours if row["rel_rmse"] <= theirs["rel_rmse"]]
-    return float(theirs["processor_seconds"] / min(seconds)) if seconds else None
 
 
 def _content(rows: list[Row]) -> str:

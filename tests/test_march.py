@@ -2,12 +2,17 @@
 layer of a picture means.
 """
 
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
 import grids
 import nubis
 import twin
+from nubis.testing import probe
 
 EARTH = 6_371_000.0
 THESIS = 400_000.0
@@ -459,6 +464,41 @@ def test_bands_do_not_show(renderer):
             make.render(camera, other)
         pictures.append(make.render(camera, params).tobytes())
     assert pictures[0] == pictures[1] == pictures[2]
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 7, 64, 301])
+def test_workgroups_do_each_part_once(count):
+    """And where threads share them out by their numbers, the first has a part of each region."""
+    numbers = np.arange(count)
+    x = np.stack([numbers, np.full(count, count)], axis=-1)
+    parts = probe("f32(spread(u32(x.x), u32(x.y)))", x, imports=["workgroups"])[:, 0]
+    np.testing.assert_array_equal(np.sort(parts), numbers)
+    threads = int(probe("f32(frame.threads)", [0.0])[0, 0])
+    assert threads >= 1
+    if count >= 8 * threads:
+        gaps = np.diff(np.sort(parts[: count // threads]))
+        assert gaps.max() <= threads
+
+
+PICTURE = """
+import os, sys, numpy as np, nubis
+if sys.argv[2] == "one":
+    os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
+camera, params = nubis.scenes["above"]
+renderer = nubis.Renderer(77, 45, quality="draft")
+frames = renderer.animate([(camera, params, 0.0)] * 2)
+np.save(sys.argv[1], np.stack([renderer.render(camera, params), *frames]))
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="processes cannot be bound")
+def test_the_number_of_processors_does_not_show(tmp_path):
+    pictures = []
+    for processors in "one", "all":
+        path = tmp_path / f"{processors}.npy"
+        subprocess.run([sys.executable, "-c", PICTURE, path, processors], check=True, timeout=120)
+        pictures.append(np.load(path))
+    np.testing.assert_array_equal(*pictures)
 
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 64), (64, 1), (7, 5), (33, 17)])

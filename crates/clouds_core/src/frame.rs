@@ -46,6 +46,8 @@ params! {
         /// Shift of the blue noise from frame to frame.
         jitter_shift: f32 = 0.0;
 
+        /// Threads among which the device shares the workgroups of a dispatch, 1 unless it is a processor (workgroups.wgsl).
+        threads: u32 = 1;
         /// Rays of the list in this dispatch (passes/march, passes/reference, passes/path).
         active_rays: u32 = 0;
         /// The first of them (passes/march).
@@ -550,9 +552,9 @@ impl Frame {
         self.high_origin = plane(at, high.scale);
         self.high_broad_origin = plane(at, HIGH_BROAD * high.scale);
         self.high_direction = along.as_vec2().to_array();
-        // In steps of a 512th of the smallest octave's life, which change no pixel by more than two thousandths: a new
+        // In steps of a 256th of the smallest octave's life, which change no pixel by more than four thousandths: a new
         // texture in every frame would take longer than all else that is baked.
-        let step = 1.0 / (512.0 * f64::from(high.evolution) * f64::from(1u32 << (high.octaves - 1)));
+        let step = 1.0 / (256.0 * f64::from(high.evolution) * f64::from(1u32 << (high.octaves - 1)));
         let time = if step.is_finite() { (time / step).round() * step } else { time };
         for octave in 0..8 {
             let updates = time * f64::from(high.evolution) * f64::from(1u32 << octave);

@@ -143,6 +143,8 @@ pub struct Gpu {
     pub(crate) queue: wgpu::Queue,
     /// Most bytes that one buffer can hold for a shader.
     pub(crate) max_buffer: u64,
+    /// Threads among which it shares the workgroups of a dispatch, where it is a processor; else 1.
+    pub(crate) threads: u32,
     pub(crate) repeat_sampler: wgpu::Sampler,
     pub(crate) clamp_sampler: wgpu::Sampler,
     pub(crate) mirror_sampler: wgpu::Sampler,
@@ -262,7 +264,9 @@ impl Gpu {
                 ..Default::default()
             })
         };
+        let threads = thread::available_parallelism().map_or(1, |threads| threads.get() as u32);
         Ok(Self {
+            threads: if info.kind == "cpu" { threads } else { 1 },
             info,
             adapter: adapter.clone(),
             repeat_sampler: sampler("repeat_sampler", wgpu::AddressMode::Repeat),
@@ -375,97 +379,52 @@ impl Gpu {
     /// A half-float texture of four channels; a depth of 1 makes it flat. Half floats filter exactly on lavapipe, where
     /// 8-bit ones have 256 levels (docs/numerics.md), and four channels of them can be stored to on every adapter.
     pub(crate) fn texture(&self, label: &str, size: [u32; 3], mips: u32) -> wgpu::Texture {
-        let flat = size[2] == 1;
-        self.baked(label, size, mips, if flat { wgpu::TextureDimension::D2 } else { wgpu::TextureDimension::D3 })
+        let dimension = if size[2] == 1 { wgpu::TextureDimension::D2 } else { wgpu::TextureDimension::D3 };
+        self.allocate(
+            label,
+            size,
+            mips,
+            dimension,
+            wgpu::TextureFormat::Rgba16Float,
+            wgpu::TextureUsages::STORAGE_BINDING,
+        )
     }
 
     /// The same, but never flat.
     pub(crate) fn texture_3d(&self, label: &str, size: [u32; 3]) -> wgpu::Texture {
-        self.baked(label, size, 1, wgpu::TextureDimension::D3)
+        let (dimension, storage) = (wgpu::TextureDimension::D3, wgpu::TextureUsages::STORAGE_BINDING);
+        self.allocate(label, size, 1, dimension, wgpu::TextureFormat::Rgba16Float, storage)
     }
 
-    fn baked(&self, label: &str, size: [u32; 3], mips: u32, dimension: wgpu::TextureDimension) -> wgpu::Texture {
+    /// A flat texture of one or two channels, to be filled from here or from a buffer, as it cannot be stored to everywhere.
+    pub(crate) fn flat(&self, label: &str, [width, height]: [u32; 2], format: wgpu::TextureFormat) -> wgpu::Texture {
+        let dimension = wgpu::TextureDimension::D2;
+        self.allocate(label, [width, height, 1], 1, dimension, format, wgpu::TextureUsages::empty())
+    }
+
+    /// The same with a depth, and mips.
+    pub(crate) fn volume(&self, label: &str, size: [u32; 3], mips: u32, format: wgpu::TextureFormat) -> wgpu::Texture {
+        self.allocate(label, size, mips, wgpu::TextureDimension::D3, format, wgpu::TextureUsages::empty())
+    }
+
+    fn allocate(
+        &self,
+        label: &str,
+        [width, height, depth_or_array_layers]: [u32; 3],
+        mip_level_count: u32,
+        dimension: wgpu::TextureDimension,
+        format: wgpu::TextureFormat,
+        more: wgpu::TextureUsages,
+    ) -> wgpu::Texture {
+        let copies = wgpu::TextureUsages::COPY_SRC | wgpu::TextureUsages::COPY_DST;
         self.device.create_texture(&wgpu::TextureDescriptor {
             label: Some(label),
-            size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: size[2] },
-            mip_level_count: mips,
+            size: wgpu::Extent3d { width, height, depth_or_array_layers },
+            mip_level_count,
             sample_count: 1,
             dimension,
-            format: wgpu::TextureFormat::Rgba16Float,
-            usage: wgpu::TextureUsages::TEXTURE_BINDING
-                | wgpu::TextureUsages::STORAGE_BINDING
-                | wgpu::TextureUsages::COPY_SRC
-                | wgpu::TextureUsages::COPY_DST,
-            view_formats: &[],
-        })
-    }
-
-    /// A flat square texture of one or two half-float channels, to be filled from a buffer.
-    pub(crate) fn map(&self, label: &str, size: u32, format: wgpu::TextureFormat) -> wgpu::Texture {
-        self.device.create_texture(&wgpu::TextureDescriptor {
-            label: Some(label),
-            size: wgpu::Extent3d { width: size, height: size, depth_or_array_layers: 1 },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
             format,
-            usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC | wgpu::TextureUsages::COPY_DST,
-            view_formats: &[],
-        })
-    }
-
-    /// A cube of one half-float channel with all its mips, to be filled from buffers.
-    pub(crate) fn noise_volume(&self, label: &str, size: u32) -> wgpu::Texture {
-        self.device.create_texture(&wgpu::TextureDescriptor {
-            label: Some(label),
-            size: wgpu::Extent3d { width: size, height: size, depth_or_array_layers: size },
-            mip_level_count: size.ilog2() + 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D3,
-            format: wgpu::TextureFormat::R16Float,
-            usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC | wgpu::TextureUsages::COPY_DST,
-            view_formats: &[],
-        })
-    }
-
-    /// A row of pairs of f32, to be loaded.
-    pub(crate) fn table(&self, label: &str, count: u32) -> wgpu::Texture {
-        self.device.create_texture(&wgpu::TextureDescriptor {
-            label: Some(label),
-            size: wgpu::Extent3d { width: count, height: 1, depth_or_array_layers: 1 },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: wgpu::TextureFormat::Rg32Float,
-            usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
-            view_formats: &[],
-        })
-    }
-
-    /// A texture of one channel that is filled from here: half floats to be filtered, or f32 to be loaded.
-    pub(crate) fn volume(&self, label: &str, size: [u32; 3], format: wgpu::TextureFormat) -> wgpu::Texture {
-        self.device.create_texture(&wgpu::TextureDescriptor {
-            label: Some(label),
-            size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: size[2] },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D3,
-            format,
-            usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
-            view_formats: &[],
-        })
-    }
-
-    /// A flat texture of f32 that is filled from here, to be loaded.
-    pub(crate) fn flat(&self, label: &str, [width, height]: [u32; 2], format: wgpu::TextureFormat) -> wgpu::Texture {
-        self.device.create_texture(&wgpu::TextureDescriptor {
-            label: Some(label),
-            size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format,
-            usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING | copies | more,
             view_formats: &[],
         })
     }
@@ -580,15 +539,11 @@ impl Work<'_> {
         self.encoder.clear_buffer(buffer, 0, None);
     }
 
-    /// Fills a mip of a texture of half floats from a buffer, whose rows are padded to whole 256 bytes.
-    pub fn fill(&mut self, texture: &wgpu::Texture, mip_level: u32, texels: &wgpu::Buffer) {
-        let size = texture.size().mip_level_size(mip_level, texture.dimension());
-        let texel = texture.format().block_copy_size(None).unwrap_or(8);
-        let bytes_per_row = Some((texel * size.width).next_multiple_of(256));
-        let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row, rows_per_image: Some(size.height) };
-        let source = wgpu::TexelCopyBufferInfo { buffer: texels, layout };
-        let target = wgpu::TexelCopyTextureInfo { mip_level, ..texture.as_image_copy() };
-        self.encoder.copy_buffer_to_texture(source, target, size);
+    /// Fills a mip of a texture from a buffer, whose rows are padded to whole 256 bytes.
+    pub fn fill(&mut self, texture: &wgpu::Texture, mip_level: u32, buffer: &wgpu::Buffer) {
+        let Some((target, layout, size)) = mips(texture).nth(mip_level as usize) else { return };
+        let layout = wgpu::TexelCopyBufferLayout { offset: 0, ..layout };
+        self.encoder.copy_buffer_to_texture(wgpu::TexelCopyBufferInfo { buffer, layout }, target, size);
     }
 
     /// Brings `bytes` of a buffer back; [`Work::submit`] returns them in the order of the calls.
@@ -656,7 +611,7 @@ fn mips(
     let texel = texture.format().block_copy_size(None).unwrap_or(8);
     (0..texture.mip_level_count()).map(move |mip_level| {
         let size = texture.size().mip_level_size(mip_level, texture.dimension());
-        // Rows that are downloaded begin at multiples of 256 bytes.
+        // Rows that are copied begin at multiples of 256 bytes.
         let row = (texel * size.width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
         let offset = end;
         end += u64::from(row) * u64::from(size.height) * u64::from(size.depth_or_array_layers);

@@ -1,5 +1,6 @@
 // Puts the clouds, seen through the air, before the sky: what the caller gets.
 #import bindings
+#import workgroups
 #import camera
 #import atmosphere
 #import light
@@ -49,7 +50,13 @@ struct Layer {
 }
 
 @compute @workgroup_size(8, 8)
-fn composite(@builtin(global_invocation_id) id: vec3u) {
+fn composite(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_id) local: vec3u,
+) {
+    // By rows, as neighbours read the same.
+    let id = 8u * vec2u(group.x, spread(group.y, groups.y)) + local.xy;
     if id.x >= frame.width || id.y >= frame.rows {
         return;
     }
@@ -167,7 +174,12 @@ fn cell_across(direction: vec3f, distance: f32, altitude: f32) -> f32 {
 
 // Puts the clouds of a cell before what lies behind them, or lists it.
 @compute @workgroup_size(8, 8)
-fn composite_cells(@builtin(global_invocation_id) id: vec3u) {
+fn composite_cells(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_id) local: vec3u,
+) {
+    let id = 8u * vec2u(group.x, spread(group.y, groups.y)) + local.xy;
     let columns = cell_columns();
     if id.x >= columns || id.y >= (frame.rows + TILE - 1u) / TILE {
         return;

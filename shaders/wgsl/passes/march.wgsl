@@ -1,5 +1,6 @@
 // Marches each pixel's ray through the cloud shell: radiance, transmittance, depth, samples (nubis2015, "march").
 #import bindings
+#import workgroups
 #import camera
 #import shell
 #import density
@@ -7,7 +8,12 @@
 #import scene_depth
 
 @compute @workgroup_size(8, 8)
-fn march(@builtin(global_invocation_id) id: vec3u) {
+fn march(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_id) local: vec3u,
+) {
+    let id = 8u * spread_over(group.xy, groups.xy) + local.xy;
     if id.x >= frame.march_width || id.y >= frame.rows {
         return;
     }
@@ -16,11 +22,16 @@ fn march(@builtin(global_invocation_id) id: vec3u) {
 
 // Marches the pixels of a list (passes/refine).
 @compute @workgroup_size(64)
-fn march_list(@builtin(global_invocation_id) id: vec3u) {
-    if id.x >= frame.active_rays {
+fn march_list(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_id) local: vec3u,
+) {
+    let number = 64u * spread(group.x, groups.x) + local.x;
+    if number >= frame.active_rays {
         return;
     }
-    let index = active_rays[frame.first_ray + id.x];
+    let index = active_rays[frame.first_ray + number];
     let known = select(EVERYWHERE, cloud_span[index], frame.spans > 0u);
     cloud_span[index] = march_cell(index, known);
 }

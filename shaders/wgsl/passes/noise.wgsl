@@ -17,8 +17,8 @@ fn stretched(worley: f32) -> f32 {
     return remap01(worley, 0.2, 0.75);
 }
 
-// 128^3, the base shape of four noises: R Perlin-Worley; G, B, A Worley FBMs of rising frequency, dark at the feature points, as the sampler's
-// remap(R, -(1 - fbm(GBA)), 1, 0, 1) wants them. The five Worley octaves are computed once and shared.
+// 128^3, the base shape of four noises: R Perlin-Worley; G, B, A Worley FBMs of rising frequency, dark at the feature points,
+// as the sampler's remap(R, -(1 - fbm(GBA)), 1, 0, 1) wants them. The five Worley octaves are computed once and shared.
 // vsu2022: Perlin-Worley of rising frequency in all four, G, B, A in the same sense.
 @compute @workgroup_size(4, 4, 4)
 fn shape(@builtin(global_invocation_id) id: vec3u) {
@@ -78,7 +78,7 @@ fn curl_potential(p: vec2f, seed: u32) -> f32 {
 // 128^2: the curl of a potential, which has no divergence: it swirls and never gathers (Bridson 2007). About -1 to 1.
 @compute @workgroup_size(8, 8)
 fn curl(@builtin(global_invocation_id) id: vec3u) {
-    const SIZE = 128u;
+    const SIZE = 128u; // as in noise.rs
     if any(id.xy >= vec2u(SIZE)) {
         return;
     }

@@ -1,6 +1,7 @@
 // How much direct sun comes through the clouds to a plane (the user's map), or to the ground around the eye (for pictures):
 // each texel looks at the sun.
 #import bindings
+#import workgroups
 #import density
 #import panels
 #import shell
@@ -30,7 +31,12 @@ fn shadow_map(@builtin(global_invocation_id) id: vec3u) {
 }
 
 @compute @workgroup_size(8, 8)
-fn shadow_ground(@builtin(global_invocation_id) id: vec3u) {
+fn shadow_ground(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_id) local: vec3u,
+) {
+    let id = 8u * spread_over(group.xy, groups.xy) + local.xy;
     if id.x >= SHADOW_SIDE || id.y >= SHADOW_SIDE * SHADOW_LEVELS {
         return;
     }

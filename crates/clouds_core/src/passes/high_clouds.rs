@@ -37,7 +37,7 @@ impl HighClouds {
             // One channel: with four, three of them for nothing, it drops out of the cache of a core (reading it took
             // composite 24 ms at 1080p on a busy machine, not 16). Such a texture cannot be stored to, so it is filled
             // from a buffer.
-            let texture = ctx.gpu.map("high_clouds", size, wgpu::TextureFormat::R16Float);
+            let texture = ctx.gpu.flat("high_clouds", [size; 2], wgpu::TextureFormat::R16Float);
             let texels = ctx.gpu.buffer("high_clouds", u64::from(2 * size.next_multiple_of(128) * size));
             let mut work = ctx.gpu.work();
             if high.coverage > 0.0 {

@@ -86,7 +86,7 @@ impl Uniforms {
     /// For the next band of the same picture.
     pub fn upload_frame(&self, gpu: &Gpu, frame: &Frame) {
         let mut words = vec![0; schema::size(Frame::FIELDS) / 4];
-        frame.write(&mut words);
+        Frame { threads: gpu.threads, ..frame.clone() }.write(&mut words);
         gpu.queue.write_buffer(&self.frame, 0, bytemuck::cast_slice(&words));
     }
 

@@ -30,9 +30,10 @@ impl Noise {
         if let Some(noise) = shared.as_ref().filter(|noise| noise.key == key) {
             return Ok(noise.clone());
         }
-        let shape = ctx.gpu.noise_volume("shape", SHAPE_SIZE);
-        let detail = ctx.gpu.noise_volume("detail", DETAIL_SIZE);
-        let curl = ctx.gpu.map("curl", CURL_SIZE, wgpu::TextureFormat::Rg16Float);
+        let volume =
+            |label, size: u32| ctx.gpu.volume(label, [size; 3], size.ilog2() + 1, wgpu::TextureFormat::R16Float);
+        let (shape, detail) = (volume("shape", SHAPE_SIZE), volume("detail", DETAIL_SIZE));
+        let curl = ctx.gpu.flat("curl", [CURL_SIZE; 2], wgpu::TextureFormat::Rg16Float);
         kept(ctx, "noise", &format!("{key:?}"), &[&shape, &detail, &curl], |ctx| {
             bake_volume(ctx, "shape", &shape)?;
             bake_volume(ctx, "detail", &detail)?;

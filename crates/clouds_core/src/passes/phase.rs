@@ -26,7 +26,7 @@ impl PhaseTable {
         let view = self.table.get(diameter, || {
             // A kernel that could read a texture must be given one.
             let texels = diameter.map_or_else(|| vec![[0.0; 2]; 2], kept);
-            let texture = ctx.gpu.table("phase_table", texels.len() as u32);
+            let texture = ctx.gpu.flat("phase_table", [texels.len() as u32, 1], wgpu::TextureFormat::Rg32Float);
             ctx.gpu.write_texture(&texture, &texels);
             Ok(texture.create_view(&wgpu::TextureViewDescriptor::default()))
         })?;

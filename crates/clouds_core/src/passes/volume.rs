@@ -38,7 +38,7 @@ impl Volume {
             let grid = params.volume.as_ref().map_or(nothing, |grid| (grid.extinction(), grid.size()));
             let scale = params.volume.as_ref().map_or(1.0, |grid| grid.max().max(f32::MIN_POSITIVE).recip());
             let (half, full) = if precise { (nothing, grid) } else { (grid, nothing) };
-            let texture = |label, size: [usize; 3], format| ctx.gpu.volume(label, size.map(|n| n as u32), format);
+            let texture = |label, size: [usize; 3], format| ctx.gpu.volume(label, size.map(|n| n as u32), 1, format);
             let filtered = texture("volume", half.1, wgpu::TextureFormat::R16Float);
             let texels: Vec<_> = half.0.iter().map(|v| half::f16::from_f32(v * scale)).collect();
             ctx.gpu.write_texture(&filtered, &texels);

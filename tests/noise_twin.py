@@ -162,6 +162,33 @@ def detail_texels(texels, clouds):
     return out
 
 
+def detail_size(clouds):
+    return DETAIL_SIZE if clouds.fine_detail == 0 else 5 * DETAIL_SIZE
+
+
+def detail_bake(clouds):
+    """The detail, and the same again a fifth as wide, with its axes turned."""
+
+    def coarse(texels):
+        return (detail_texels(texels, clouds) @ FBM)[..., None]
+
+    if clouds.fine_detail == 0:
+        return coarse
+    every = np.stack(np.meshgrid(*[np.arange(DETAIL_SIZE)] * 3, indexing="ij"), axis=-1)
+    table = coarse(every)
+
+    def known(texels):
+        return table[tuple(np.moveaxis(texels, -1, 0))]
+
+    def both(texels):
+        p = centres(texels, detail_size(clouds)).reshape(-1, 3)
+        fine = sample(known, DETAIL_SIZE, 5 * p[:, [2, 0, 1]])
+        found = sample(known, DETAIL_SIZE, p) + f32(clouds.fine_detail) * (fine - 0.5)
+        return np.clip(found, 0, 1).reshape(*texels.shape[:-1], 1)
+
+    return both
+
+
 def curl_texels(texels, clouds):
     """Bridson 2007: (dpsi/dy, -dpsi/dx), by differences over one texel, a fifth of it."""
 
@@ -430,7 +457,7 @@ def bakes(params):
         "broad_map": lambda texels: broad_texels(texels, params.weather),
         "shape_noise": lambda texels: base_shape(shape_texels(texels, params.clouds))[..., None],
         "curl_noise": lambda texels: curl_texels(texels, params.clouds),
-        "detail_noise": lambda texels: (detail_texels(texels, params.clouds) @ FBM)[..., None],
+        "detail_noise": detail_bake(params.clouds),
     }
 
 
@@ -620,8 +647,5 @@ class Field:
         swirl = sample(self.textures["curl_noise"], CURL_SIZE, at)[:, :2]
         moved[:, :2] += f32(clouds.curl) * (1 - height[:, None]) * swirl
         at = moved / f32(clouds.detail_scale)
-        detail = sample(self.textures["detail_noise"], DETAIL_SIZE, at)[:, 0]
-        finer = 5 * at[:, [2, 0, 1]]
-        fine = sample(self.textures["detail_noise"], DETAIL_SIZE, finer)[:, 0]
-        detail = np.clip(detail + f32(clouds.fine_detail) * (fine - 0.5), 0, 1)
+        detail = sample(self.textures["detail_noise"], detail_size(clouds), at)[:, 0]
         return eroded(shape, detail, height, f32(clouds.detail))

@@ -286,13 +286,13 @@ def test_reads_are_counted():
     assert (day["reads"] == sum(day[name] for name in counts.TEXTURES)).all()
     assert (day["weather_map"] == day["evaluations"]).all()
     assert (day["shape_noise"] == day["evaluations"]).all()
-    assert (2 * day["curl_noise"] == day["detail_noise"]).all()
+    assert (day["curl_noise"] == day["detail_noise"]).all()
     assert not any(day[name].any() for name in ("sun_volume", "broad_map", "profile_table"))
     broad = [counts.Job(*FAIR, quality, kind) for kind in ("evaluations", "broad_map")]
     assert np.array_equal(*counts.count(broad, (48, 27)))
-    # Five full light samples of five reads and a far one of two at each lit step.
+    # Five full light samples of four reads and a far one of two at each lit step.
     lit = (day["evaluations"] - dark["evaluations"]) / 6
-    assert lit.any() and (day["reads"] - dark["reads"] == 27 * lit).all()
+    assert lit.any() and (day["reads"] - dark["reads"] == 22 * lit).all()
 
 
 def test_only_the_march_is_counted():

@@ -153,8 +153,6 @@ def test_density_is_the_published_sampler(renderer, rng, time):
     swirled = at + c.curl * (1 - height[:, None]) * swirl
     at = moved(swirled, w.detail_speed) / c.detail_scale
     detail = read("detail_noise", at)[:, 0]
-    fine = read("detail_noise", 5 * at[:, [2, 0, 1]])[:, 0]
-    detail = np.clip(detail + c.fine_detail * (fine - 0.5), 0, 1)
 
     profile = height_profile(height, np.full(len(height), 0.6), c)
     shape = with_coverage(noise * profile, 0.8)

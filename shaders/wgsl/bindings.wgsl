@@ -16,6 +16,7 @@ override RAINY: bool = true; // it may rain: cumulonimbus grow
 override RAIN_SHAFTS: bool = true; // rain is seen below the clouds
 override UPPER: bool = true; // there is a second deck
 override FINE_DETAIL: bool = true; // a finer detail is added to the detail
+const FINER = 5.0; // how much smaller that is: a whole number, so that its tiles fill that of the detail
 override BROAD_WEATHER: bool = true; // a larger map shifts the weather
 override PROFILE_TABLE: bool = false; // the profile by height is the user's table
 override BEAMS: bool = false; // clouds cast shadows on the air

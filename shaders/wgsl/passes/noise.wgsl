@@ -71,6 +71,21 @@ fn detail(@builtin(global_invocation_id) id: vec3u) {
     textureStore(volume_out, id, vec4f(fbm3(texel)));
 }
 
+// The detail and the same again, smaller: as wide as the finer one's texels are, which meet those of the other, so that it
+// lies between them on the same straight lines as it does where it is read alone.
+@compute @workgroup_size(4, 4, 4)
+fn finer_detail(@builtin(global_invocation_id) id: vec3u) {
+    let size = textureDimensions(volume_out);
+    if any(id >= size) {
+        return;
+    }
+    let p = tile_point(id, size);
+    let detail = textureSampleLevel(volume_in, repeat_sampler, p, 0.0).r;
+    // Its axes are others, so that the two show no pattern together. Its mean is 0.5.
+    let fine = textureSampleLevel(volume_in, repeat_sampler, FINER * p.zxy, 0.0).r;
+    textureStore(volume_out, id, vec4f(saturate(detail + params.clouds.fine_detail * (fine - 0.5))));
+}
+
 fn curl_potential(p: vec2f, seed: u32) -> f32 {
     return perlin_fbm(vec3f(p, 0.5), 4u, 3u, seed);
 }
@@ -91,7 +106,7 @@ fn curl(@builtin(global_invocation_id) id: vec3u) {
     texels_out[id.y * SIZE + id.x] = pack2x16float(vec2f(dy, -dx) / (2.0 * e) / 5.0);
 }
 
-// A volume as half floats of one channel, two in each word, in rows of 128 or more.
+// A volume as half floats of one channel, two in each word, in rows of so many 128 as hold them.
 @compute @workgroup_size(64)
 fn pack(@builtin(global_invocation_id) id: vec3u) {
     let size = textureDimensions(volume_in);
@@ -100,7 +115,7 @@ fn pack(@builtin(global_invocation_id) id: vec3u) {
     }
     let at = vec3u(2u * id.x, id.yz);
     let pair = vec2f(textureLoad(volume_in, at, 0).r, textureLoad(volume_in, at + vec3u(1u, 0u, 0u), 0).r);
-    texels_out[(id.z * size.y + id.y) * max(size.x, 128u) / 2u + id.x] = pack2x16float(pair);
+    texels_out[(id.z * size.y + id.y) * ((size.x + 127u) / 128u * 64u) + id.x] = pack2x16float(pair);
 }
 
 // Half the size, each texel the mean of eight: wgpu makes no mips of volumes.

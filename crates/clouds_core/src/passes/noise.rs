@@ -11,12 +11,14 @@ use crate::params::{self, Params};
 const SHAPE_SIZE: u32 = 128;
 /// Texels of the detail's side (nubis2015).
 const DETAIL_SIZE: u32 = 32;
+/// How much smaller the finer detail is that is added to it (as in bindings.wgsl).
+const FINER: u32 = 5;
 /// Texels of the curl noise's side (nubis2015).
 const CURL_SIZE: u32 = 128;
 
 /// The baked textures.
 pub struct Noise {
-    key: (u32, params::Noise),
+    key: (u32, params::Noise, f32),
     shape: wgpu::TextureView,
     detail: wgpu::TextureView,
     curl: wgpu::TextureView,
@@ -25,21 +27,25 @@ pub struct Noise {
 impl Noise {
     /// The noise for these parameters: the last one baked if it fits, else a new one.
     pub(crate) fn run(ctx: &mut Context<'_>, params: &Params) -> Result<Arc<Self>> {
-        let key = (params.clouds.seed, params.clouds.noise);
+        let finer = params.clouds.fine_detail;
+        let key = (params.clouds.seed, params.clouds.noise, finer);
         let mut shared = lock(&ctx.gpu.noise);
         if let Some(noise) = shared.as_ref().filter(|noise| noise.key == key) {
             return Ok(noise.clone());
         }
         let volume =
             |label, size: u32| ctx.gpu.volume(label, [size; 3], size.ilog2() + 1, wgpu::TextureFormat::R16Float);
-        let (shape, detail) = (volume("shape", SHAPE_SIZE), volume("detail", DETAIL_SIZE));
+        let (shape, coarse) = (volume("shape", SHAPE_SIZE), volume("detail", DETAIL_SIZE));
+        let detail = if finer > 0.0 { volume("finer detail", FINER * DETAIL_SIZE) } else { coarse.clone() };
         let curl = ctx.gpu.flat("curl", [CURL_SIZE; 2], wgpu::TextureFormat::Rg16Float);
         kept(ctx, "noise", &format!("{key:?}"), &[&shape, &detail, &curl], |ctx| {
-            bake_volume(ctx, "shape", &shape)?;
-            bake_volume(ctx, "detail", &detail)?;
+            bake_volume(ctx, "shape", &vec![], &shape)?;
+            bake_volume(ctx, "detail", &vec![], &coarse)?;
+            if finer > 0.0 {
+                bake_volume(ctx, "finer_detail", &vec![("volume_in", (&view(&coarse)).into())], &detail)?;
+            }
             bake_curl(ctx, &curl)
         })?;
-        let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
         let noise = Arc::new(Self { key, shape: view(&shape), detail: view(&detail), curl: view(&curl) });
         *shared = Some(noise.clone());
         Ok(noise)
@@ -64,9 +70,13 @@ fn bake_curl(ctx: &mut Context<'_>, target: &wgpu::Texture) -> Result<()> {
     Ok(())
 }
 
-/// Bakes a volume with the kernel `entry`, and its mips from it, into a texture of one channel: with four, as the sources
-/// have it, reading took lavapipe a quarter of a frame, not a seventh. Such a texture cannot be stored to.
-fn bake_volume(ctx: &mut Context<'_>, entry: &str, target: &wgpu::Texture) -> Result<()> {
+fn view(texture: &wgpu::Texture) -> wgpu::TextureView {
+    texture.create_view(&wgpu::TextureViewDescriptor::default())
+}
+
+/// Bakes a volume with the kernel `entry` from what it reads, and its mips from it, into a texture of one channel: with four,
+/// as the sources have it, reading took lavapipe a quarter of a frame, not a seventh. Such a texture cannot be stored to.
+fn bake_volume(ctx: &mut Context<'_>, entry: &str, reads: &Bindings<'_>, target: &wgpu::Texture) -> Result<()> {
     let size = target.width();
     let texture = ctx.gpu.texture(entry, [size; 3], target.mip_level_count());
     let mip = |level: u32| {
@@ -78,8 +88,7 @@ fn bake_volume(ctx: &mut Context<'_>, entry: &str, target: &wgpu::Texture) -> Re
     };
     let mut work = ctx.gpu.work();
     let out = mip(0);
-    let mut bindings = ctx.uniforms.bindings();
-    bindings.push(("volume_out", (&out).into()));
+    let bindings = [ctx.uniforms.bindings(), reads.clone(), vec![("volume_out", (&out).into())]].concat();
     work.dispatch(&*ctx.gpu.kernel("noise", entry, ctx.variant)?, &bindings, [size; 3])?;
     let downsample = ctx.gpu.kernel("noise", "downsample", ctx.variant)?;
     for level in 1..texture.mip_level_count() {

@@ -161,7 +161,7 @@ def test_finer_detail(rng, noise_params, share, level):
     expected = noise_twin.mip(bake, at, level)
     got = texels("detail_noise", at, params, level)[:, :1]
     np.testing.assert_allclose(got, expected, atol=(level + 3) * STEP)
-    assert expected.std() > 0.1
+    assert expected.std() > 0.03
 
 
 def test_curl_noise(rng, noise_params):
@@ -222,7 +222,7 @@ def test_high_cloud_map(rng, time, high):
     got = texels("high_map", at, params, time=time)[:, :1]
     assert expected.std() > 0.05
     # The swirl moves points off the centres of texels, where f32 has 2^-24 of a tile: 1e-4 of the
-    # finest cell. Between two textures no time is more than 1/512 of the smallest octave's life away.
+    # finest cell. No time is more than 1/512 of the smallest octave's life from a texture's.
     rounded = 2e-3 if time else 0.0
     np.testing.assert_allclose(got, expected, atol=STEP + 1e-4 + rounded)
 

@@ -7,6 +7,7 @@ import pytest
 
 import nubis
 import twin
+from nubis.testing import probe
 
 DOWN = nubis.Camera.look_at((0, 0, 6000), (0, 5000, 0), (0, 0, 1), 50.0)
 SIZE = 64, 36
@@ -54,6 +55,34 @@ def test_map_is_the_marched_reference(renderer):
     expected = twin.sun_transmittance(renderer(), params, points, 600)
     assert expected.std() > 0.1
     assert rms(shadow.transmittance.ravel() - expected) < 0.005
+
+
+def test_depth_is_the_sum_of_its_samples(renderer, rng):
+    """Neighbours whose rays leave the clouds earlier lose and gain none by those that go on."""
+    params = nubis.scenes["fair_weather"][1]
+    points = np.zeros((1500, 3))
+    points[:, :2] = rng.uniform(-8000, 8000, (1500, 2))
+    step = "2.0 * finest_feature()"
+    ask = {"imports": ["passes/shadow"], "params": params}
+    got = probe(f"cloud_depth_to_sun(x.xyz, {step}, 2048.0)", points, **ask)[:, 0].astype(float)
+    stretches = "cloud_stretches_from(x.xyz, frame.sun_direction)"
+    way = f"vec4f({stretches}.start, {stretches}.first, {stretches}.second, {step})"
+    start, first, second, fine = probe(way, points, **ask).astype(float).T
+    assert (second == 0).all()
+    sun = probe("vec4f(frame.sun_direction, frame.extinction)", [0.0], **ask)[0].astype(float)
+    counts = np.ceil(first / fine).astype(int)
+    assert len(set(counts)) > 1
+    owner = np.repeat(np.arange(len(points)), counts)
+    number = np.concatenate([np.arange(n) for n in counts])
+    length = first[owner] / counts[owner]
+    at = points[owner] + (start[owner] + (number + 0.5) * length)[:, None] * sun[:3]
+    density = probe("cloud_density_at(x.xyz, altitude_at(x.xyz), 0.0)", at, **ask)[:, 0]
+    expected = np.bincount(owner, density * sun[3] * length)
+    # Past an optical depth of 7 it stops, as all is dark.
+    light = expected < 7
+    assert light.mean() > 0.5 and (expected[light] > 0.1).sum() > 50
+    np.testing.assert_allclose(got[light], expected[light], rtol=1e-3, atol=1e-4)
+    assert (got[~light] >= 7 * (1 - 1e-3)).all()
 
 
 def test_map_is_orthographic_along_the_sun(renderer):

@@ -90,8 +90,9 @@ fn shadow_mean(@builtin(local_invocation_id) id: vec3u) {
 }
 
 // Optical depth of the marched clouds from a point to the sun, and of what of them is over a quarter, a half and three quarters
-// of their height, from the far end on, so that what is behind `DARK` is dark in all of them. In steps of `fine` metres, or longer ones. Each reads the finest
-// noise: coarser levels of detail make clouds smaller, and the ground of `fair_weather` 3 % too bright in the mean, not 1 %.
+// of their height, from the far end on, so that what is behind `DARK` is dark in all of them. In steps of `fine` metres, or
+// longer ones. Each reads the finest noise: coarser levels of detail make clouds smaller, and the ground of `fair_weather` 3 %
+// too bright in the mean, not 1 %.
 fn cloud_depth_to_sun(p: vec3f, fine: f32, most: f32) -> vec4f {
     let s = cloud_stretches_from(p, frame.sun_direction);
     let length = s.first + s.second;
@@ -101,13 +102,20 @@ fn cloud_depth_to_sun(p: vec3f, fine: f32, most: f32) -> vec4f {
     var i = 0.0;
     // A loop in a loop, as in passes/march: where the weather alone says that there is nothing, nothing else is read.
     loop {
-        var column: Column;
-        var q: vec3f;
+        var column = Column();
+        var q = vec3f(0.0);
         loop {
-            q = p + stretch_distance(s, (count - i - 0.5) * step) * frame.sun_direction;
-            column = cloud_column(q, altitude_at(q));
+            let at = p + stretch_distance(s, (count - i - 0.5) * step) * frame.sun_direction;
+            let found = cloud_column(at, altitude_at(at));
             i += 1.0;
-            if column.limit > 0.0 || i >= count {
+            // Left in two places, with what was found or with nothing: of what is the same wherever a loop is left, lavapipe
+            // keeps the last turn's even for those that left before (docs/numerics.md).
+            if found.limit > 0.0 {
+                column = found;
+                q = at;
+                break;
+            }
+            if i >= count {
                 break;
             }
         }

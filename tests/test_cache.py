@@ -22,15 +22,16 @@ RENDER = """
 import hashlib, nubis
 renderer = nubis.Renderer(48, 27, quality="draft")
 camera, params = nubis.scenes["fair_weather"]
-frame = renderer.render(camera, params.with_(**{{"clouds.seed": {seed}}}))
+changes = {{"clouds.seed": {seed}, "clouds.fine_detail": {finer}}}
+frame = renderer.render(camera, params.with_(**changes))
 print(hashlib.sha256(frame.tobytes()).hexdigest(), *renderer.timings)
 """
-NOISE = {"shape", "detail", "curl", "downsample"}
+NOISE = {"shape", "detail", "finer_detail", "curl", "downsample"}
 
 
-def render(folder, seed=5):
+def render(folder, seed=5, finer=0.6):
     """The picture's checksum and the kernels of a first render in a process of its own."""
-    done = run_python(RENDER.format(seed=seed), NUBIS_CACHE=str(folder))
+    done = run_python(RENDER.format(seed=seed, finer=finer), NUBIS_CACHE=str(folder))
     assert done.returncode == 0, done.stderr
     picture, *kernels = done.stdout.split()
     return picture, set(kernels)
@@ -75,6 +76,13 @@ def test_another_seed_is_another_file(filled, baked):
     assert len(files(filled, "noise")) == 2 and len(files(filled, "weather")) == 1
 
 
+def test_another_finer_detail_is_baked_alone(filled, baked):
+    picture, kernels = render(filled, finer=0.25)
+    assert picture != baked and "finer_detail" in kernels
+    assert not kernels & (NOISE - {"finer_detail", "downsample"})
+    assert len(files(filled, "noise")) == 1 and len(files(filled, "finer_detail")) == 2
+
+
 @pytest.mark.parametrize("damage", ["truncated", "empty", "flipped", "longer", "foreign"])
 def test_damaged_files_are_made_again(filled, baked, damage):
     good = {path: path.read_bytes() for path in filled.iterdir()}
@@ -109,11 +117,11 @@ def test_a_file_of_another_key_is_not_read(filled):
     [other] = set(files(filled, "noise")) - {path}
     other.write_bytes(good)
     again, kernels = render(filled, seed=6)
-    assert again == picture and kernels >= NOISE
+    assert again == picture and kernels >= NOISE - {"finer_detail"}
 
 
 def test_processes_at_once(tmp_path, baked):
-    code = RENDER.format(seed=5)
+    code = RENDER.format(seed=5, finer=0.6)
     env = os.environ | {"NUBIS_CACHE": str(tmp_path)}
     command = [sys.executable, "-c", code]
     running = [
@@ -191,7 +199,7 @@ def test_clear_removes_what_is_ours(_filled, monkeypatch, capsys, tmp_path):
     assert main(["cache"]) == 0
     folder, size = capsys.readouterr().out.splitlines()[-1].rsplit(": ", 1)
     assert folder == str(tmp_path / "cache")
-    assert np.isclose(float(size.removesuffix(" MB")), 8.7, atol=0.3)
+    assert np.isclose(float(size.removesuffix(" MB")), 17.0, atol=0.3)
     # One of a writer that died, and one of somebody else.
     (tmp_path / "cache" / "nubis-cache-noise-x1y2.tmp").write_bytes(b"torn")
     (tmp_path / "cache" / "nubis-thesis.tex").write_text("mine")

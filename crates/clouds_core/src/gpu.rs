@@ -440,9 +440,9 @@ impl Gpu {
         );
     }
 
-    /// Fills a texture and its mips with the bytes that [`Work::download_texture`] gave.
+    /// Fills a texture and its mips with the [`texture_bytes`] of [`texture_rows`].
     pub(crate) fn restore_texture(&self, texture: &wgpu::Texture, bytes: &[u8]) {
-        for (target, layout, size) in mips(texture) {
+        for (target, layout, size) in mips(texture, 1) {
             self.queue.write_texture(target, bytes, layout, size);
         }
     }
@@ -541,7 +541,7 @@ impl Work<'_> {
 
     /// Fills a mip of a texture from a buffer, whose rows are padded to whole 256 bytes.
     pub fn fill(&mut self, texture: &wgpu::Texture, mip_level: u32, buffer: &wgpu::Buffer) {
-        let Some((target, layout, size)) = mips(texture).nth(mip_level as usize) else { return };
+        let Some((target, layout, size)) = mips(texture, COPIED).nth(mip_level as usize) else { return };
         let layout = wgpu::TexelCopyBufferLayout { offset: 0, ..layout };
         self.encoder.copy_buffer_to_texture(wgpu::TexelCopyBufferInfo { buffer, layout }, target, size);
     }
@@ -553,10 +553,10 @@ impl Work<'_> {
         self.downloads.push(staging);
     }
 
-    /// The same for a texture of half floats and its mips.
+    /// The same for a texture of half floats and its mips, whose rows are padded.
     pub fn download_texture(&mut self, texture: &wgpu::Texture) {
-        let staging = self.gpu.staging(texture_bytes(texture));
-        for (source, layout, size) in mips(texture) {
+        let staging = self.gpu.staging(texture_bytes(texture, COPIED));
+        for (source, layout, size) in mips(texture, COPIED) {
             let target = wgpu::TexelCopyBufferInfo { buffer: &staging, layout };
             self.encoder.copy_texture_to_buffer(source, target, size);
         }
@@ -603,16 +603,19 @@ impl Work<'_> {
     }
 }
 
-/// The mips of a texture of half floats, and where their texels lie in memory, one mip after the other.
+/// What the rows of a texture that is copied to or from a buffer are padded to, bytes.
+const COPIED: u32 = wgpu::COPY_BYTES_PER_ROW_ALIGNMENT;
+
+/// The mips of a texture of half floats, and where their texels lie in memory, one mip after the other, their rows padded.
 fn mips(
     texture: &wgpu::Texture,
+    padded: u32,
 ) -> impl Iterator<Item = (wgpu::TexelCopyTextureInfo<'_>, wgpu::TexelCopyBufferLayout, wgpu::Extent3d)> {
     let mut end = 0;
     let texel = texture.format().block_copy_size(None).unwrap_or(8);
     (0..texture.mip_level_count()).map(move |mip_level| {
         let size = texture.size().mip_level_size(mip_level, texture.dimension());
-        // Rows that are copied begin at multiples of 256 bytes.
-        let row = (texel * size.width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let row = (texel * size.width).next_multiple_of(padded);
         let offset = end;
         end += u64::from(row) * u64::from(size.height) * u64::from(size.depth_or_array_layers);
         let layout =
@@ -621,13 +624,23 @@ fn mips(
     })
 }
 
-/// How many bytes [`Work::download_texture`] gives.
-pub(crate) fn texture_bytes(texture: &wgpu::Texture) -> u64 {
+/// The rows that [`Work::download_texture`] gave, without what pads them.
+pub(crate) fn texture_rows<'a>(texture: &'a wgpu::Texture, bytes: &'a [u8]) -> impl Iterator<Item = &'a [u8]> {
+    let padded = mips(texture, COPIED).zip(mips(texture, 1));
+    padded.flat_map(move |((_, layout, size), (_, tight, _))| {
+        let [row, own] = [layout, tight].map(|layout| layout.bytes_per_row.unwrap_or(0) as usize);
+        let rows = (size.height * size.depth_or_array_layers) as usize;
+        (0..rows).map(move |i| &bytes[layout.offset as usize + i * row..][..own])
+    })
+}
+
+/// How many bytes a texture and its mips have, with rows padded.
+pub(crate) fn texture_bytes(texture: &wgpu::Texture, padded: u32) -> u64 {
     let bytes = |layout: wgpu::TexelCopyBufferLayout, size: wgpu::Extent3d| {
         let row = u64::from(layout.bytes_per_row.unwrap_or(0));
         layout.offset + row * u64::from(size.height) * u64::from(size.depth_or_array_layers)
     };
-    mips(texture).last().map_or(0, |(_, layout, size)| bytes(layout, size))
+    mips(texture, padded).last().map_or(0, |(_, layout, size)| bytes(layout, size))
 }
 
 /// Bytes that came back from the GPU.

@@ -879,7 +879,8 @@ impl World {
         let variant = Variant::of_frame(params, quality, frame);
         let mut ctx = Context { gpu, uniforms: &self.uniforms, variant: Variant::bake(), timings, interrupt };
 
-        let noise = self.noise.insert(Noise::run(&mut ctx, params)?); // once for a seed
+        let noise = Noise::run(&mut ctx, params, self.noise.as_ref())?; // once for a seed and a finer detail
+        let noise = self.noise.insert(noise);
         let weather = self.weather.run(&mut ctx, params)?; // when its block or the mixture changes
         let broad_weather = self.broad_weather.run(&mut ctx, params)?; // when the larger map or its shares change
         let profile = self.profile.run(&ctx, params)?; // once for a table

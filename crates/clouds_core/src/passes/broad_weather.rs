@@ -58,7 +58,7 @@ fn bake_source(ctx: &mut Context<'_>, params: &Params, source: &BroadSource) -> 
         }
         BroadSource::Seed(seed) => {
             let texture = ctx.gpu.texture("broad_weather", [SIZE, SIZE, 1], 1);
-            kept(ctx, "broad_weather", &seed.to_string(), &[&texture], |ctx| {
+            kept(ctx, "broad_weather", "broad_weather", &seed.to_string(), &[&texture], |ctx| {
                 let weather = Weather { seed: *seed, ..params.weather.clone() };
                 ctx.uniforms.upload_params(ctx.gpu, &Params { weather, ..params.clone() });
                 let baked = bake_map(ctx, "broad_weather", "broad_weather", &texture);

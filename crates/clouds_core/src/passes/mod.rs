@@ -27,7 +27,7 @@ pub mod weather;
 use crate::cache;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
-use crate::gpu::{Download, Gpu, Interrupt, Timings, texture_bytes};
+use crate::gpu::{Gpu, Interrupt, Timings, texture_bytes, texture_rows};
 use crate::kernel::{Binding, Variant};
 use crate::params::{self, Params, Quality};
 use crate::scene_depth::SceneTextures;
@@ -114,12 +114,14 @@ impl<K: PartialEq, T> Baked<K, T> {
     }
 }
 
-/// Fills textures with what an earlier process has baked for `key`, or by `bake`, for the next process to find.
+/// Fills textures with what an earlier process has baked for `key`, or by `bake`, a kernel of `pass`, for the next process to
+/// find among its files of this `kind`.
 ///
 /// Only where the CPU bakes: a GPU needs a few milliseconds, which is less than reading the file takes.
 pub(crate) fn kept<'a>(
     ctx: &mut Context<'a>,
     pass: &str,
+    kind: &str,
     key: &str,
     textures: &[&wgpu::Texture],
     bake: impl FnOnce(&mut Context<'a>) -> Result<()>,
@@ -129,10 +131,10 @@ pub(crate) fn kept<'a>(
         return bake(ctx);
     }
     let shader = Linked::new(&format!("passes/{pass}")).map_err(Error::Device)?.code;
-    let bytes: Vec<_> = textures.iter().map(|texture| texture_bytes(texture) as usize).collect();
+    let bytes: Vec<_> = textures.iter().map(|texture| texture_bytes(texture, 1) as usize).collect();
     // Drivers differ in how they round.
     let key = format!("{} {}\n{key}\n{bytes:?}\n{shader}", gpu.info.name, gpu.info.driver);
-    if let Some(stored) = cache::load(pass, &key).filter(|stored| stored.len() == bytes.iter().sum()) {
+    if let Some(stored) = cache::load(kind, &key).filter(|stored| stored.len() == bytes.iter().sum()) {
         let mut rest = stored.as_slice();
         for (texture, bytes) in textures.iter().zip(bytes) {
             let (own, others) = rest.split_at(bytes);
@@ -147,7 +149,7 @@ pub(crate) fn kept<'a>(
         work.download_texture(texture);
     }
     let baked = work.submit(ctx.timings, ctx.interrupt)?;
-    let parts: Vec<&[u8]> = baked.iter().map(Download::numbers).collect();
-    cache::store(pass, &key, &parts);
+    let rows = textures.iter().zip(&baked).flat_map(|(texture, bytes)| texture_rows(texture, bytes.numbers()));
+    cache::store(kind, &key, &[&rows.collect::<Vec<_>>().concat()]);
     Ok(())
 }

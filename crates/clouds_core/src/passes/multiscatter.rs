@@ -25,7 +25,7 @@ impl Multiscatter {
         let key = format!("{from:?}");
         let view = self.made.get(from, || {
             let texture = ctx.gpu.texture("air_light", SIZE, 1);
-            kept(ctx, "multiscatter", &key, &[&texture], |ctx| bake(ctx, &texture, air))?;
+            kept(ctx, "multiscatter", "multiscatter", &key, &[&texture], |ctx| bake(ctx, &texture, air))?;
             Ok(texture.create_view(&wgpu::TextureViewDescriptor::default()))
         })?;
         Ok(vec![("air_light", view.into())])

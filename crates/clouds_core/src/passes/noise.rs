@@ -18,35 +18,49 @@ const CURL_SIZE: u32 = 128;
 
 /// The baked textures.
 pub struct Noise {
-    key: (u32, params::Noise, f32),
+    key: (u32, params::Noise),
+    finer: f32,
     shape: wgpu::TextureView,
+    /// The detail alone.
+    coarse: wgpu::Texture,
+    /// The same with the finer one.
     detail: wgpu::TextureView,
     curl: wgpu::TextureView,
 }
 
 impl Noise {
-    /// The noise for these parameters: the last one baked if it fits, else a new one.
-    pub(crate) fn run(ctx: &mut Context<'_>, params: &Params) -> Result<Arc<Self>> {
+    /// The noise for these parameters: the renderer's own or the last one baked if they fit, else a new one.
+    pub(crate) fn run(ctx: &mut Context<'_>, params: &Params, own: Option<&Arc<Self>>) -> Result<Arc<Self>> {
+        let key = (params.clouds.seed, params.clouds.noise);
         let finer = params.clouds.fine_detail;
-        let key = (params.clouds.seed, params.clouds.noise, finer);
         let mut shared = lock(&ctx.gpu.noise);
-        if let Some(noise) = shared.as_ref().filter(|noise| noise.key == key) {
+        let known: Vec<_> = own.cloned().into_iter().chain(shared.clone()).filter(|noise| noise.key == key).collect();
+        if let Some(noise) = known.iter().find(|noise| noise.finer == finer) {
             return Ok(noise.clone());
         }
-        let volume =
-            |label, size: u32| ctx.gpu.volume(label, [size; 3], size.ilog2() + 1, wgpu::TextureFormat::R16Float);
-        let (shape, coarse) = (volume("shape", SHAPE_SIZE), volume("detail", DETAIL_SIZE));
-        let detail = if finer > 0.0 { volume("finer detail", FINER * DETAIL_SIZE) } else { coarse.clone() };
-        let curl = ctx.gpu.flat("curl", [CURL_SIZE; 2], wgpu::TextureFormat::Rg16Float);
-        kept(ctx, "noise", &format!("{key:?}"), &[&shape, &detail, &curl], |ctx| {
-            bake_volume(ctx, "shape", &vec![], &shape)?;
-            bake_volume(ctx, "detail", &vec![], &coarse)?;
-            if finer > 0.0 {
-                bake_volume(ctx, "finer_detail", &vec![("volume_in", (&view(&coarse)).into())], &detail)?;
+        let (shape, coarse, curl) = match known.first() {
+            Some(noise) => (noise.shape.clone(), noise.coarse.clone(), noise.curl.clone()),
+            None => {
+                let (shape, coarse) = (volume(ctx, "shape", SHAPE_SIZE), volume(ctx, "detail", DETAIL_SIZE));
+                let curl = ctx.gpu.flat("curl", [CURL_SIZE; 2], wgpu::TextureFormat::Rg16Float);
+                kept(ctx, "noise", "noise", &format!("{key:?}"), &[&shape, &coarse, &curl], |ctx| {
+                    bake_volume(ctx, "shape", &vec![], &shape)?;
+                    bake_volume(ctx, "detail", &vec![], &coarse)?;
+                    bake_curl(ctx, &curl)
+                })?;
+                (view(&shape), coarse, view(&curl))
             }
-            bake_curl(ctx, &curl)
-        })?;
-        let noise = Arc::new(Self { key, shape: view(&shape), detail: view(&detail), curl: view(&curl) });
+        };
+        let detail = if finer > 0.0 {
+            let detail = volume(ctx, "finer_detail", FINER * DETAIL_SIZE);
+            kept(ctx, "noise", "finer_detail", &format!("{key:?} {finer}"), &[&detail], |ctx| {
+                bake_volume(ctx, "finer_detail", &vec![("volume_in", (&view(&coarse)).into())], &detail)
+            })?;
+            view(&detail)
+        } else {
+            view(&coarse)
+        };
+        let noise = Arc::new(Self { key, finer, shape, coarse, detail, curl });
         *shared = Some(noise.clone());
         Ok(noise)
     }
@@ -68,6 +82,11 @@ fn bake_curl(ctx: &mut Context<'_>, target: &wgpu::Texture) -> Result<()> {
     work.fill(target, 0, &texels);
     work.submit(ctx.timings, ctx.interrupt)?;
     Ok(())
+}
+
+/// A volume of one channel with all its mips.
+fn volume(ctx: &Context<'_>, label: &str, size: u32) -> wgpu::Texture {
+    ctx.gpu.volume(label, [size; 3], size.ilog2() + 1, wgpu::TextureFormat::R16Float)
 }
 
 fn view(texture: &wgpu::Texture) -> wgpu::TextureView {

@@ -23,7 +23,7 @@ impl Transmittance {
         let key = format!("{from:?}");
         let view = self.made.get(from, || {
             let texture = ctx.gpu.texture("air_depth", SIZE, 1);
-            kept(ctx, "transmittance", &key, &[&texture], |ctx| {
+            kept(ctx, "transmittance", "transmittance", &key, &[&texture], |ctx| {
                 bake_map(ctx, "transmittance", "transmittance_bake", &texture)
             })?;
             Ok(texture.create_view(&wgpu::TextureViewDescriptor::default()))

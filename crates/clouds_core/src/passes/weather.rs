@@ -95,7 +95,7 @@ fn bake_source(ctx: &mut Context<'_>, params: &Params, weather: &params::Weather
         return Ok(upload(ctx, map));
     }
     let texture = ctx.gpu.texture("weather", [SIZE, SIZE, 1], 1);
-    kept(ctx, "weather", &format!("{weather:?}"), &[&texture], |ctx| {
+    kept(ctx, "weather", "weather", &format!("{weather:?}"), &[&texture], |ctx| {
         let alone = Params { weather: weather.clone(), ..params.clone() };
         ctx.uniforms.upload_params(ctx.gpu, &alone);
         let usual = ctx.variant;

@@ -232,7 +232,7 @@ params! {
 const HIGH_BROAD: f32 = 3.2;
 
 /// Sine of the sun's height, 20 degrees, above which its light is as good as the same on all high clouds in sight (as in
-/// passes/composite.wgsl).
+/// high_light.wgsl).
 const HIGH_LOW_SUN: f64 = 0.342;
 
 /// What the sun's half width, 0.005 as in atmosphere.wgsl, and f32 may add to its height, radians.

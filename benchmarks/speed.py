@@ -203,10 +203,13 @@ def growth(repeats: int) -> list[Row]:
     return rows
 
 
-def animation(scene: str, size: Size, quality: str, *, errors: bool = True) -> Row:
+def animation(
+    scene: str, size: Size, quality: str, *, errors: bool = True, plots: Path | None = None
+) -> Row:
     """A flight at 60 m/s: the time of a frame, and how far frames and stills are from each other.
 
-    And how far the last of both is from `high`, whose stills have hardly any noise.
+    And how far the last of both is from `high`, whose stills have hardly any noise. That frame is
+    saved among the `plots`.
     """
     method = OURS[quality] if quality in OURS else nubis.quality(quality)
     shots = list(_flight(scene))
@@ -225,6 +228,9 @@ def animation(scene: str, size: Size, quality: str, *, errors: bool = True) -> R
                 high = nubis.Renderer(*size, quality="high")
                 high = high.render(*shots[i][:2], time=shots[i][2])
                 truth = [_difference(frame, high), _difference(alone, high)]
+    if plots:
+        plots.mkdir(parents=True, exist_ok=True)
+        nubis.save(plots / f"{scene}-frame.png", frame[..., :3])
     return {
         "scene": scene,
         "size": size,
@@ -255,7 +261,14 @@ def _difference(frame: npt.NDArray[Any], still: npt.NDArray[Any]) -> float:
 PARTS = "published", "content", "growth", "animation"
 
 
-def run(size: Size, repeats: int, parts: Sequence[str] = PARTS, *, quick: bool = False) -> Row:
+def run(
+    size: Size,
+    repeats: int,
+    parts: Sequence[str] = PARTS,
+    *,
+    plots: Path | None = None,
+    quick: bool = False,
+) -> Row:
     """All of it, or some parts."""
     found: Row = {}
     if "published" in parts:
@@ -271,7 +284,7 @@ def run(size: Size, repeats: int, parts: Sequence[str] = PARTS, *, quick: bool =
         found["animation"] = [animation("fair_weather", large, quality) for quality in FLOWN]
         found["anchors"] = [
             {"still": still(anchor, OURS["draft"], *nubis.scenes[scene], repeats)}
-            | animation(scene, anchor, "draft")
+            | animation(scene, anchor, "draft", plots=plots)
             for scene in ANCHORS
         ]
     return found
@@ -292,7 +305,8 @@ def main() -> None:
         command += ["--only", *args.only]
     header = measure.header(command) | {"size": (width, height), "repeats": args.repeats}
     kept = json.loads(args.out.read_text()) if args.out.exists() else {"headers": {}}
-    kept |= run((width, height), args.repeats, args.only, quick=args.quick)
+    plots = args.out.parent / "plots"
+    kept |= run((width, height), args.repeats, args.only, plots=plots, quick=args.quick)
     kept["headers"] |= dict.fromkeys(args.only, header)
     args.out.write_text(json.dumps(kept, indent=1) + "\n")
     if args.out.parent.resolve() == RESULTS:

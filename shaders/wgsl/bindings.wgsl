@@ -157,6 +157,12 @@ struct PathRay {
 @group(0) @binding(23) var volume_in: texture_3d<f32>;
 @group(0) @binding(24) var volume_out: texture_storage_3d<rgba16float, write>;
 @group(0) @binding(22) var<storage, read_write> texels_out: array<u32>; // of one channel, two half floats in each
+
+// Words of a row of so many of those: padded to whole 256 bytes, as copies to a texture ask for.
+fn packed_row(texels: u32) -> u32 {
+    return (texels + 127u) / 128u * 64u;
+}
+
 @group(0) @binding(43) var mix_a: texture_2d<f32>; // weather maps, or orders of scattering, that are mixed
 @group(0) @binding(44) var mix_b: texture_2d<f32>;
 @group(0) @binding(45) var mix_c: texture_2d<f32>;

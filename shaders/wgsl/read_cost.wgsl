@@ -67,7 +67,7 @@ fn reads_of_curl_noise(start: vec3f, count: u32) -> f32 {
 fn reads_of_detail_noise(start: vec3f, count: u32) -> f32 {
     var sum = vec4f(0.0);
     for (var i = 0u; i < count; i++) {
-        sum += textureSampleLevel(detail_noise, repeat_sampler, read_at(start, i, 160.0), read_lod(i));
+        sum += textureSampleLevel(detail_noise, repeat_sampler, read_at(start, i, 32.0 * FINER), read_lod(i));
     }
     return dot(sum, vec4f(1.0));
 }

@@ -7,11 +7,16 @@
 fn spread(number: u32, count: u32) -> u32 {
     let length = max(count / frame.threads, 1u);
     let part = number % length * frame.threads + number / length;
-    return select(number, part, number < length * frame.threads && count >= frame.threads);
+    return select(number, part, number < length * frame.threads);
 }
 
 // The same for a picture of `groups`, in which they are numbered row by row.
 fn spread_over(group: vec2u, groups: vec2u) -> vec2u {
     let part = spread(group.y * groups.x + group.x, groups.x * groups.y);
     return vec2u(part % groups.x, part / groups.x);
+}
+
+// The same by rows, where neighbours read the same.
+fn spread_rows(group: vec2u, groups: vec2u) -> vec2u {
+    return vec2u(group.x, spread(group.y, groups.y));
 }

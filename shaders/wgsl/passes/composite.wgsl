@@ -41,8 +41,7 @@ fn composite(
     @builtin(num_workgroups) groups: vec3u,
     @builtin(local_invocation_id) local: vec3u,
 ) {
-    // By rows, as neighbours read the same.
-    let id = 8u * vec2u(group.x, spread(group.y, groups.y)) + local.xy;
+    let id = 8u * spread_rows(group.xy, groups.xy) + local.xy;
     if id.x >= frame.width || id.y >= frame.rows {
         return;
     }
@@ -165,7 +164,7 @@ fn composite_cells(
     @builtin(num_workgroups) groups: vec3u,
     @builtin(local_invocation_id) local: vec3u,
 ) {
-    let id = 8u * vec2u(group.x, spread(group.y, groups.y)) + local.xy;
+    let id = 8u * spread_rows(group.xy, groups.xy) + local.xy;
     let columns = cell_columns();
     if id.x >= columns || id.y >= (frame.rows + TILE - 1u) / TILE {
         return;

@@ -49,7 +49,7 @@ fn high_clouds_mixed(@builtin(global_invocation_id) id: vec3u) {
     bake(id, true, true);
 }
 
-// Two texels in each invocation, as one number of the buffer holds them; its rows are padded as copies ask for.
+// Two texels in each invocation, as one number of the buffer holds them.
 fn bake(id: vec3u, with_streaks: bool, with_cells: bool) {
     let size = params.high_clouds.texture_size;
     if 2u * id.x >= size || id.y >= size {
@@ -64,7 +64,7 @@ fn bake(id: vec3u, with_streaks: bool, with_cells: bool) {
         }
         x++;
     }
-    texels_out[id.y * ((size + 127u) / 128u * 64u) + id.x] = pack2x16float(pair);
+    texels_out[id.y * packed_row(size) + id.x] = pack2x16float(pair);
 }
 
 // How much of the sky they cover at a place in the tile.

@@ -71,8 +71,8 @@ fn detail(@builtin(global_invocation_id) id: vec3u) {
     textureStore(volume_out, id, vec4f(fbm3(texel)));
 }
 
-// The detail and the same again, smaller: as wide as the finer one's texels are, which meet those of the other, so that it
-// lies between them on the same straight lines as it does where it is read alone.
+// 160^3, the detail and the same again, smaller. Its texels are those of the smaller one, and the middle of every fifth is that
+// of a texel of the detail: between them both lie on the same straight lines as where they are read alone.
 @compute @workgroup_size(4, 4, 4)
 fn finer_detail(@builtin(global_invocation_id) id: vec3u) {
     let size = textureDimensions(volume_out);
@@ -106,7 +106,7 @@ fn curl(@builtin(global_invocation_id) id: vec3u) {
     texels_out[id.y * SIZE + id.x] = pack2x16float(vec2f(dy, -dx) / (2.0 * e) / 5.0);
 }
 
-// A volume as half floats of one channel, two in each word, in rows of so many 128 as hold them.
+// A volume as half floats of one channel, two in each word.
 @compute @workgroup_size(64)
 fn pack(@builtin(global_invocation_id) id: vec3u) {
     let size = textureDimensions(volume_in);
@@ -115,7 +115,7 @@ fn pack(@builtin(global_invocation_id) id: vec3u) {
     }
     let at = vec3u(2u * id.x, id.yz);
     let pair = vec2f(textureLoad(volume_in, at, 0).r, textureLoad(volume_in, at + vec3u(1u, 0u, 0u), 0).r);
-    texels_out[(id.z * size.y + id.y) * ((size.x + 127u) / 128u * 64u) + id.x] = pack2x16float(pair);
+    texels_out[(id.z * size.y + id.y) * packed_row(size.x) + id.x] = pack2x16float(pair);
 }
 
 // Half the size, each texel the mean of eight: wgpu makes no mips of volumes.

@@ -21,6 +21,7 @@ override BROAD_WEATHER: bool = true; // a larger map shifts the weather
 override PROFILE_TABLE: bool = false; // the profile by height is the user's table
 override BEAMS: bool = false; // clouds cast shadows on the air
 override SCENE: bool = false; // there is a scene of the user's among the clouds
+override SPARSE: bool = false; // the clouds are known at the corners of cells of pixels alone, see lattice.wgsl
 override LIGHT_DETAIL: bool = true; // there are light samples that see the detail
 override LIGHT_CHEAP: bool = true; // there are light samples that do not
 
@@ -66,7 +67,7 @@ override LIGHT_CHEAP: bool = true; // there are light samples that do not
 // Light that the air before a distance lacks in those shadows, by place in the picture, times frame.sky_scale (passes/beams).
 @group(0) @binding(51) var beams: texture_3d<f32>;
 
-// One entry a pixel, row by row.
+// One entry a pixel, row by row; of the clouds one for each that they are known at (lattice.wgsl).
 @group(0) @binding(12) var<storage, read_write> clouds: array<vec4f>; // premultiplied radiance, transmittance
 @group(0) @binding(13) var<storage, read_write> cloud_depth: array<f32>; // m to the mean scattering point, -1 where none
 @group(0) @binding(14) var<storage, read_write> samples: array<u32>; // density evaluations

@@ -33,9 +33,11 @@ fn view_direction(pixel: vec2f) -> vec4f {
     return vec4f(normalize(direction), valid);
 }
 
-// The pixel that is marched for a cell of a subset. The last cells may hang over the edge; they march the edge.
+// The pixel that is marched for a cell of a subset. The last cells may hang over the edge; they march the edge, or, in a sparse
+// picture, what is beyond.
 fn marched_pixel(cell: vec2u) -> vec2u {
-    return min(cell * frame.stride + vec2u(frame.subpixel_x, frame.subpixel_y), vec2u(frame.width, frame.height) - 1u);
+    let pixel = cell * frame.stride + vec2u(frame.subpixel_x, frame.subpixel_y);
+    return select(min(pixel, vec2u(frame.width, frame.height) - 1u), pixel, SPARSE);
 }
 
 // Where in the picture of a camera a direction falls, given as right, up and forward of that: from -1 to 1, right and up, or

@@ -9,7 +9,7 @@ use glam::{DVec2, DVec3, Vec3};
 use crate::camera::{Camera, Projection};
 use crate::params;
 use crate::params::{Edge, Params};
-use crate::passes::{broad_weather, shadow, sun_volume};
+use crate::passes::{broad_weather, refine, shadow, sun_volume};
 use crate::wind::Carried;
 
 params! {
@@ -37,6 +37,8 @@ params! {
         march_width: u32 = 1;
         /// Every how many of those a ray is known, in both directions (passes/refine).
         lattice: u32 = 1;
+        /// 1 where the clouds are known at the corners of cells of pixels alone, for which kernels are compiled (lattice.wgsl).
+        sparse: u32 = 0;
         /// 1 when the rays look for cloud where their neighbours have found it, 0 when they look everywhere.
         spans: u32 = 0;
         /// 1 to put the clouds before the sky, 0 to return them alone.
@@ -348,6 +350,18 @@ impl Frame {
             _ => 2.0 * self.tan_half_fov / self.height as f32,
         };
         pixel * self.stride as f32
+    }
+
+    /// How many pixels of the whole picture the clouds are known at, across and down (lattice.wgsl).
+    pub fn known(&self) -> [u32; 2] {
+        refine::known([self.width, self.height], self.sparse > 0)
+    }
+
+    /// The same for the march of a sheet: of all its pixels, or of those that its clouds are known at.
+    pub fn of_known(&self) -> Self {
+        let [march_width, sheet_rows] = refine::known([self.width, self.sheet_rows], self.sparse > 0);
+        let stride = refine::spacing(self.sparse > 0);
+        Self { stride, march_width, sheet_row: self.sheet_row / stride, sheet_rows, ..self.clone() }
     }
 
     /// Whether the sun can reach the clouds: false only where `sky_light` is none (passes/sky.wgsl, atmosphere.wgsl).

@@ -6,6 +6,7 @@ use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::gpu::Gpu;
 use crate::params::{Model, Params, Phase, Quality, WeatherNoise};
+use crate::passes::reproject;
 use crate::shader::Linked;
 use wgpu::naga::{AddressSpace, Module, valid::ModuleInfo};
 
@@ -88,6 +89,8 @@ pub(crate) struct Variant {
     pub beams: bool,
     /// Whether there is a scene of the user's.
     pub scene: bool,
+    /// Whether the clouds are known at the corners of cells of pixels alone.
+    pub sparse: bool,
     /// Whether there are light samples that see the detail.
     pub light_detail: bool,
     /// Whether there are light samples that do not.
@@ -131,6 +134,7 @@ impl Variant {
             profile_table: params.clouds.profile.is_some() && params.volume.is_none(),
             beams: false,
             scene: false,
+            sparse: false,
             light_detail: quality.cheap_light > 0.0,
             light_cheap: quality.cheap_light < 1.0
                 || quality.far_sample
@@ -159,11 +163,12 @@ impl Variant {
             camera: frame.camera_kind,
             beams: frame.beams > 0,
             scene: frame.scene > 0,
+            sparse: frame.sparse > 0,
             ..Self::new(params, quality)
         }
     }
 
-    fn constants(self) -> [(&'static str, f64); 26] {
+    fn constants(self) -> [(&'static str, f64); 28] {
         let switch = |on| f64::from(u8::from(on));
         [
             ("MODEL", f64::from(self.model as u32)),
@@ -182,6 +187,8 @@ impl Variant {
             ("PROFILE_TABLE", switch(self.profile_table)),
             ("BEAMS", switch(self.beams)),
             ("SCENE", switch(self.scene)),
+            ("SPARSE", switch(self.sparse)),
+            ("STRIDE", f64::from(reproject::stride(self.sparse))),
             ("LIGHT_DETAIL", switch(self.light_detail)),
             ("LIGHT_CHEAP", switch(self.light_cheap)),
             ("CAMERA", f64::from(self.camera)),

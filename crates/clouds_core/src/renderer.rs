@@ -28,8 +28,7 @@ use crate::passes::phase::PhaseTable;
 use crate::passes::profile::Profile;
 use crate::passes::rays::Rays;
 use crate::passes::refine::{COARSEST, Refined};
-pub use crate::passes::reproject::ROUND;
-use crate::passes::reproject::{Followed, History, ORDER, STRIDE};
+use crate::passes::reproject::{Followed, History};
 use crate::passes::shadow::{self, GroundShadow};
 use crate::passes::sky::Sky;
 use crate::passes::sun_volume::SunVolume;
@@ -40,6 +39,9 @@ use crate::passes::{Bindings, Context, Scene, Uniforms, composite, march, path, 
 use crate::scene_depth::{SceneDepth, SceneTextures};
 use crate::shader::Linked;
 use crate::wind::Carried;
+
+/// What [`Renderer::history_length`] says of a pixel that has had a ray of its own: frames in which every pixel is marched once.
+pub const ROUND: u32 = reproject::round(false);
 
 /// Makes pictures of one size with one numerical method on one device.
 pub struct Renderer {
@@ -93,7 +95,7 @@ impl Method {
     fn kernels(self, params: &Params, quality: &Quality, frame: &Frame, variant: Variant, layers: bool) -> Vec<Wanted> {
         let clouds: &[_] = match self {
             _ if frame.cloudless > 0 => &[],
-            Self::March if refine::coarsest(frame, quality) > 1 => &[("march", "march_list"), ("refine", "refine")],
+            Self::March if refine::is_needed(frame, quality) => &[("march", "march_list"), ("refine", "refine")],
             Self::March => &[("march", "march")],
             Self::Reference => &[("reference", "reference")],
             Self::Path => &[("path", "path")],
@@ -134,8 +136,9 @@ impl Method {
 
 /// Buffers of the sheets of a still, kept from one to the next.
 struct Still {
-    pixels: u64,
+    size: [u32; 2],
     method: Method,
+    sparse: bool,
     refined: Refined,
     marched: Marched,
     composed: Composed,
@@ -159,6 +162,7 @@ struct Refining {
 /// Buffers of whole pictures, and what reprojection remembers of the frame before.
 struct Animation {
     size: [u32; 2],
+    sparse: bool,
     refined: Refined,
     fresh: Marched,
     before: Followed,
@@ -299,6 +303,8 @@ impl Renderer {
         let method = Method::new(params, &self.quality);
         frame.cloudless = u32::from(method.is_cloudless(params));
         let Self { gpu, world, quality, timings, .. } = self;
+        let sparse = method == Method::March && refine::is_sparse(&frame, quality);
+        frame.sparse = u32::from(sparse);
         let variant = Variant::of_frame(params, quality, &frame);
         let [width, height] = self.size;
         let sheet_pixels = scene_depth.map_or(0, |_| u64::from(width) * u64::from(largest_sheet(self.size, method)));
@@ -310,23 +316,24 @@ impl Renderer {
             world.run(gpu, params, &frame, (camera.eye, time), quality, timings, interrupt)
         })?;
 
-        let lattice = refine::coarsest(&frame, quality) > 1;
+        let lattice = method == Method::March && refine::is_needed(&frame, quality);
         let by_cells = method.by_cells(&frame, quality);
         let mut picture = Picture::default();
         for sheet in sheets([width, height], method) {
             frame.sheet_row = sheet.start;
             frame.rows = sheet.len() as u32;
             // Lattices of rays meet in the first row of the next sheet.
-            let shared = u32::from(method == Method::March && lattice && sheet.end < height);
+            let shared = u32::from(lattice && sheet.end < height);
             frame.sheet_rows = frame.rows + shared;
-            let pixels = u64::from(width) * u64::from(frame.sheet_rows);
-            if self.still.as_ref().is_none_or(|still| still.pixels < pixels || still.method != method) {
-                self.still = Some(Still::new(gpu, [width, frame.sheet_rows], method));
+            let size = [width, frame.sheet_rows];
+            if self.still.as_ref().is_none_or(|still| !still.holds(size, method, sparse)) {
+                self.still = Some(Still::new(gpu, size, method, sparse));
             }
             let Some(still) = &self.still else { unreachable!("was just made") };
             if let Some(given) = &scene_depth {
                 let first = sheet.start as usize * width as usize;
-                scene.scene_depth.upload(gpu, given, first..first + pixels as usize);
+                let pixels = width as usize * frame.sheet_rows as usize;
+                scene.scene_depth.upload(gpu, given, first..first + pixels);
             }
 
             let mut ctx = Context { gpu, uniforms: scene.uniforms, variant: scene.variant, timings, interrupt };
@@ -340,6 +347,7 @@ impl Renderer {
                 }
                 _ => {
                     let pace = &mut self.march_pace;
+                    let mut frame = frame.of_known();
                     march_sheet(&mut ctx, &scene, &mut frame, quality, pace, &still.refined, &still.marched)?;
                 }
             }
@@ -351,10 +359,11 @@ impl Renderer {
             let mut work = gpu.work();
             let pixels = u64::from(width) * sheet.len() as u64;
             work.download(&composed.image, 0, 16 * pixels);
+            let [columns, rows] = refine::known([width, sheet.len() as u32], sparse);
             if all {
                 work.download(&composed.sky, 0, 16 * pixels);
                 work.download(&composed.depth, 0, 4 * pixels);
-                work.download(&marched.samples, 0, 4 * pixels);
+                work.download(&marched.samples, 0, 4 * u64::from(columns) * u64::from(rows));
                 if let Some(rays) = rays {
                     work.download(&rays.uncertainty, 0, 16 * pixels);
                 }
@@ -364,7 +373,12 @@ impl Renderer {
             if all {
                 picture.sky.extend_from_slice(downloads[1].numbers());
                 picture.depth.extend_from_slice(downloads[2].numbers());
-                picture.samples.extend_from_slice(downloads[3].numbers());
+                let samples: &[u32] = downloads[3].numbers();
+                if sparse {
+                    picture.samples.extend(at_known(samples, columns, [width, sheet.len() as u32]));
+                } else {
+                    picture.samples.extend_from_slice(samples);
+                }
                 if let Some(uncertainty) = downloads.get(4) {
                     picture.uncertainty.extend_from_slice(uncertainty.numbers());
                 }
@@ -444,27 +458,27 @@ impl Renderer {
                 format!("at most {most} pixels for animate on this adapter"),
             ));
         }
-        let cells = [width.div_ceil(STRIDE), height.div_ceil(STRIDE)];
         let Self { gpu, world, quality, timings, .. } = self;
-        let mut resized = None;
-        if let Some(old) = self.animation.take_if(|old| old.size != [width, height]) {
-            // Without a scene, whose edges would not be where they were.
-            let last = old.last.filter(|last| last.scene.is_none() && scene_depth.is_none());
-            self.animation = Some(Animation { last, ..Animation::new(gpu, [width, height]) });
-            resized = Some((old.before, old.size));
-        }
-        let animation = self.animation.get_or_insert_with(|| Animation::new(gpu, [width, height]));
         // Taken out while the frame is in the making: if it fails, the next one starts anew.
-        let last = animation.last.take().filter(|last| !last.is_cut(camera, params, time));
-        // A frame without clouds leaves no history.
+        let last = self.animation.as_mut().and_then(|animation| animation.last.take());
+        let last = last.filter(|last| !last.is_cut(camera, params, time));
+        // A frame without clouds leaves no history, nor do the edges of a scene in a picture of another size.
         let last = last.filter(|last| last.frame.cloudless == frame.cloudless);
+        let fits = |last: &Shot| [last.frame.width, last.frame.height] == [width, height];
+        let last = last.filter(|last| fits(last) || (last.scene.is_none() && scene_depth.is_none()));
+        frame.scene = u32::from(scene_depth.is_some() || last.as_ref().is_some_and(|last| last.scene.is_some()));
+        let sparse = refine::is_sparse(&frame, quality);
+        frame.sparse = u32::from(sparse);
+        let last = last.filter(|last| last.frame.sparse == frame.sparse);
+        let old = self.animation.take_if(|old| (old.size, old.sparse) != ([width, height], sparse));
+        let resized = old.map(|old| (old.before, old.size));
+        let animation = self.animation.get_or_insert_with(|| Animation::new(gpu, [width, height], sparse));
         let index = last.as_ref().map_or(0, |last| last.index + 1);
         // Where a scene was and is no more, or is and was not, there is nothing.
         let had = last.as_ref().and_then(|last| last.scene.as_deref());
         let has = scene_depth.map(|scene| scene.distance);
-        if has.is_some() || had.is_some() {
+        if frame.scene > 0 {
             let color = scene_depth.and_then(|scene| scene.color);
-            frame.scene = 1;
             frame.scene_lit = u32::from(color.is_some());
             if !world.scene_depth.holds(pixels, color.is_some()) {
                 world.scene_depth = SceneTextures::new(gpu, pixels, color.is_some());
@@ -485,7 +499,7 @@ impl Renderer {
         }
         // While anything moves, each round of the sixteen pixels moves the blue noise on by the golden ratio; a static
         // shot keeps the still's, and so becomes the still.
-        let round = if frame.moving > 0 { index / ROUND } else { 0 };
+        let round = if frame.moving > 0 && !sparse { index / ROUND } else { 0 };
         frame.jitter_shift = (f64::from(round) * 0.618_033_988_749_895).fract() as f32;
         let variant = Variant::of_frame(params, quality, &frame);
         let scene = gpu.compiling(&Method::March.kernels(params, quality, &frame, variant, false), || {
@@ -505,20 +519,21 @@ impl Renderer {
             frame.sheet_rows = height;
         } else if last.is_none() {
             frame.sheet_rows = height;
+            let mut frame = frame.of_known();
             march_sheet(&mut ctx, &scene, &mut frame, quality, &mut self.march_pace, refined, &now.marched)?;
-            now.begin(gpu);
+            now.begin(gpu, sparse);
         } else {
-            frame.stride = STRIDE;
-            [frame.subpixel_x, frame.subpixel_y] = ORDER[(index % ROUND) as usize];
-            frame.march_width = cells[0];
-            frame.sheet_rows = cells[1];
+            frame.stride = reproject::stride(sparse) * refine::spacing(sparse);
+            [frame.subpixel_x, frame.subpixel_y] = reproject::subpixel(index, sparse);
+            [frame.march_width, frame.sheet_rows] = reproject::cells(frame.known(), sparse);
             march_sheet(&mut ctx, &scene, &mut frame, quality, &mut self.march_pace, refined, fresh)?;
         }
         if last.is_some() && frame.cloudless == 0 {
             let old = History { clouds: before, scene: scene_before };
             let mut rays = 0;
             gpu.queue.write_buffer(&refined.count, 0, &[0; 4]);
-            in_bands(&mut self.reproject_pace, gpu, &scene, &mut frame, [width, height], |frame| {
+            let known = frame.known();
+            in_bands(&mut self.reproject_pace, gpu, &scene, &mut frame, known, |frame| {
                 let mut work = gpu.work();
                 reproject::run(gpu, &mut work, &scene, frame, fresh, &old, refined, now)?;
                 work.download(&refined.count, 0, 4);
@@ -614,11 +629,16 @@ impl Renderer {
         }) else {
             return Ok(Vec::new());
         };
-        let pixels = animation.size.map(u64::from).iter().product::<u64>();
+        let [width, height] = animation.size;
+        let [columns, rows] = refine::known(animation.size, animation.sparse);
         let mut work = self.gpu.work();
-        work.download(&animation.before.length, 0, 4 * pixels);
+        work.download(&animation.before.length, 0, 4 * count([columns, rows]));
         let lengths = work.submit(&mut Timings::default(), &|| Ok(()))?;
-        Ok(lengths[0].numbers().to_vec())
+        let lengths: &[u32] = lengths[0].numbers();
+        let spacing = refine::spacing(animation.sparse);
+        let unit = ROUND / reproject::round(animation.sparse);
+        let at = |x: u32, y: u32| unit * lengths[(y / spacing * columns + x / spacing) as usize];
+        Ok((0..height).flat_map(|y| (0..width).map(move |x| at(x, y))).collect())
     }
 
     /// Forgets the frame before: the next one of [`Renderer::animate`] is a still.
@@ -926,37 +946,57 @@ impl World {
 }
 
 impl Still {
-    fn new(gpu: &Gpu, size: [u32; 2], method: Method) -> Self {
-        let pixels = size.map(u64::from).iter().product();
+    fn new(gpu: &Gpu, size: [u32; 2], method: Method, sparse: bool) -> Self {
+        let [pixels, known] = [size, refine::known(size, sparse)].map(count);
         let ray_bytes = match method {
             Method::March => None,
             Method::Reference => Some(reference::RAY_BYTES),
             Method::Path => Some(path::RAY_BYTES),
         };
         Self {
-            pixels,
+            size,
             method,
-            refined: Refined::new(gpu, pixels),
-            marched: Marched::new(gpu, pixels),
+            sparse,
+            refined: Refined::new(gpu, known),
+            marched: Marched::new(gpu, known),
             composed: Composed::new(gpu, pixels),
             backdrop: Backdrop::new(gpu, size),
             rays: ray_bytes.map(|bytes| Rays::new(gpu, pixels, bytes)),
         }
     }
+
+    /// Whether a sheet has room in them.
+    fn holds(&self, [width, rows]: [u32; 2], method: Method, sparse: bool) -> bool {
+        (self.size[0], self.method, self.sparse) == (width, method, sparse) && self.size[1] >= rows
+    }
+}
+
+fn count(size: [u32; 2]) -> u64 {
+    size.map(u64::from).iter().product()
+}
+
+/// A number for each pixel of a part of a sparse picture: where it is known, one of `numbers`, which has so many columns, and
+/// none between.
+fn at_known(numbers: &[u32], columns: u32, [width, height]: [u32; 2]) -> impl Iterator<Item = u32> {
+    let place = move |x: u32, y: u32| (y / COARSEST * columns + x / COARSEST) as usize;
+    let known = |x: u32, y: u32| x.is_multiple_of(COARSEST) && y.is_multiple_of(COARSEST);
+    (0..height).flat_map(move |y| (0..width).map(move |x| if known(x, y) { numbers[place(x, y)] } else { 0 }))
 }
 
 impl Animation {
-    fn new(gpu: &Gpu, [width, height]: [u32; 2]) -> Self {
-        let pixels = u64::from(width) * u64::from(height);
-        let cells = u64::from(width.div_ceil(STRIDE)) * u64::from(height.div_ceil(STRIDE));
+    fn new(gpu: &Gpu, size: [u32; 2], sparse: bool) -> Self {
+        let known = refine::known(size, sparse);
+        let cells = reproject::cells(known, sparse);
+        let [known, cells] = [known, cells].map(count);
         Self {
-            size: [width, height],
-            refined: Refined::new(gpu, pixels),
+            size,
+            sparse,
+            refined: Refined::new(gpu, known),
             fresh: Marched::new(gpu, cells),
-            before: Followed::new(gpu, pixels),
-            now: Followed::new(gpu, pixels),
-            composed: Composed::new(gpu, pixels),
-            backdrop: Backdrop::new(gpu, [width, height]),
+            before: Followed::new(gpu, known),
+            now: Followed::new(gpu, known),
+            composed: Composed::new(gpu, count(size)),
+            backdrop: Backdrop::new(gpu, size),
             scene_before: SceneTextures::new(gpu, 0, false),
             last: None,
         }
@@ -1044,8 +1084,7 @@ fn march_sheet(
     out: &Marched,
 ) -> Result<()> {
     let (gpu, interrupt) = (ctx.gpu, ctx.interrupt);
-    let coarsest = refine::coarsest(frame, quality);
-    if coarsest == 1 {
+    if !refine::is_needed(frame, quality) {
         let size = [frame.march_width, frame.sheet_row + frame.sheet_rows];
         return in_bands(pace, gpu, scene, frame, size, |frame| {
             let mut work = gpu.work();
@@ -1054,7 +1093,7 @@ fn march_sheet(
         });
     }
     let mut frame = frame.clone();
-    frame.lattice = coarsest;
+    frame.lattice = refine::coarsest(&frame, quality);
     let mut rays = refined.begin(gpu, &frame);
     loop {
         march_listed(ctx, scene, &mut frame, rays, pace, refined, out)?;

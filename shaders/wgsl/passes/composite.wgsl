@@ -4,6 +4,7 @@
 #import camera
 #import atmosphere
 #import high_light
+#import lattice
 #import scene_depth
 #import ground_shadow
 
@@ -18,8 +19,6 @@ const SUN_RADIUS = 0.004654;
 // 1998, after Hillaire 2016).
 const LIMB = vec3f(0.397, 0.503, 0.652);
 
-// Pixels of a cell in each direction (as in composite.rs).
-const TILE = 4u;
 // Second difference between corners of cells past which each pixel of a cell is worked out, as a share of the contrast past
 // which clouds are marched, of the brightest corner: of brightness, of the transmittance of the high clouds, and of the
 // brightness behind those, which in wide smooth gradients errs the same way for many pixels. What is smooth errs by an
@@ -60,15 +59,50 @@ fn compose(pixel: vec2u) {
         }
         return;
     }
-    var here = Layer(vec3f(0.0), 1.0, 0.0);
-    if !CLOUDLESS {
-        here = marched_layer(index);
-    }
+    let at = vec2u(pixel.x, pixel.y - frame.sheet_row);
+    let here = marched_layer(at / TILE, sparse_cell(at / TILE), at.y % TILE * TILE + at.x % TILE);
     put(index, sight_of(view.xyz, pixel, scene_distance(pixel), here));
 }
 
-// What has been marched, its distance as it is.
-fn marched_layer(index: u32) -> Layer {
+// What has been marched at the corners of a cell of a sparse picture.
+struct SparseCell {
+    clouds: mat4x4f,
+    distance: mat4x2f, // weight times depth, weight
+}
+
+fn sparse_cell(cell: vec2u) -> SparseCell {
+    var found: SparseCell;
+    if SPARSE && !CLOUDLESS {
+        let columns = cell_columns() + 1u;
+        let first = cell.y * columns + cell.x;
+        found.clouds = mat4x4f(clouds[first], clouds[first + 1u], clouds[first + columns], clouds[first + columns + 1u]);
+        found.distance = mat4x2f(
+            weighted_depth(first),
+            weighted_depth(first + 1u),
+            weighted_depth(first + columns),
+            weighted_depth(first + columns + 1u),
+        );
+    }
+    return found;
+}
+
+fn weighted_depth(index: u32) -> vec2f {
+    let depth = cloud_depth[index];
+    return depth_weight(clouds[index].a, depth) * vec2f(depth, 1.0);
+}
+
+// What has been marched at a pixel of a cell, or lies between its corners; its distance as it is.
+fn marched_layer(cell: vec2u, sparse: SparseCell, i: u32) -> Layer {
+    if CLOUDLESS {
+        return Layer(vec3f(0.0), 1.0, 0.0);
+    }
+    if SPARSE {
+        let cloud = sparse.clouds * corner_shares(i);
+        let distance = sparse.distance * corner_shares(i);
+        return Layer(cloud.rgb, cloud.a, select(0.0, distance.x / distance.y, distance.y > 0.0));
+    }
+    let at = cell_pixel(TILE * cell, i);
+    let index = at.y * frame.width + at.x;
     let cloud = clouds[index];
     return Layer(cloud.rgb, cloud.a, max(cloud_depth[index], 0.0));
 }
@@ -201,11 +235,17 @@ fn composite_cells(
         edge = edge || nearest_scene(first) < NO_SCENE;
     }
     let fine = !edge && (max(farthest, -nearest) >= FINE || any(bends));
+    let sparse = sparse_cell(id.xy);
     // It does not matter what opaque clouds hide, but to who asks for the sky.
     var hidden = false;
     if !LAYERS && !CLOUDLESS {
-        let last = vec2u(frame.width, frame.sheet_row + frame.rows) - 1u;
         hidden = (edge || fine) && (!HIGH || (!VOLUME && frame.shell_top <= params.high_clouds.altitude));
+    }
+    if SPARSE && !LAYERS && !CLOUDLESS {
+        let c = sparse.clouds;
+        hidden = hidden && all(vec4f(c[0].a, c[1].a, c[2].a, c[3].a) == vec4f(0.0));
+    } else if !LAYERS && !CLOUDLESS {
+        let last = vec2u(frame.width, frame.sheet_row + frame.rows) - 1u;
         var i = 0u;
         // It leaves soon: most cells show something, and those that do not ask are never hidden. Once false, it stays so,
         // whatever lavapipe computes for a cell that has left.
@@ -230,7 +270,7 @@ fn composite_cells(
             let sky = behind * corner_shares(i);
             // Before the ground there is the lack of light in the shadows.
             let high = Layer(select(layer.rgb, vec3f(0.0), grounded), layer.a, sky.w);
-            put_behind(sheet_index(first, i), high, sky.rgb + select(vec3f(0.0), layer.rgb, grounded));
+            put_behind(sheet_index(first, i), marched_layer(id.xy, sparse, i), high, sky.rgb + select(vec3f(0.0), layer.rgb, grounded));
         }
         i++;
         if i >= select(1u, TILE * TILE, smooth_cell) {
@@ -245,7 +285,7 @@ fn composite_cells(
                 let layer = high_layer(direction, hit_sphere(direction, frame.power_high).far, true);
                 let shares = corner_shares(n);
                 let before = Air((air * shares).rgb, (haze * shares).rgb);
-                put_behind(sheet_index(first, n), through_air(layer, before), (behind * shares).rgb);
+                put_behind(sheet_index(first, n), marched_layer(id.xy, sparse, n), through_air(layer, before), (behind * shares).rgb);
             }
             n++;
             if n >= select(1u, TILE * TILE, fine_high) {
@@ -262,7 +302,7 @@ fn composite_cells(
                 let sun = ground_sun(p, cos_zenith_at(p, frame.sun_direction));
                 let shares = corner_shares(n);
                 let lit = (behind * shares).rgb - (1.0 - sun) * (air * shares).rgb;
-                put_behind(sheet_index(first, n), Layer(vec3f(0.0), 1.0, 0.0), lit);
+                put_behind(sheet_index(first, n), marched_layer(id.xy, sparse, n), Layer(vec3f(0.0), 1.0, 0.0), lit);
             }
             n++;
             if n >= select(1u, TILE * TILE, fine_ground) {
@@ -317,10 +357,9 @@ fn corner_shares(i: u32) -> vec4f {
 }
 
 // Puts a pixel: what was marched there before or behind the high clouds, and what is behind both.
-fn put_behind(index: u32, high: Layer, background: vec3f) {
+fn put_behind(index: u32, here: Layer, high: Layer, background: vec3f) {
     var seen = high;
     if !CLOUDLESS {
-        let here = marched_layer(index);
         let depth = high.distance / max(1.0 - high.transmittance, 1e-6);
         let near = Layer(here.radiance, here.transmittance, (1.0 - here.transmittance) * here.distance);
         seen = over(near, high);

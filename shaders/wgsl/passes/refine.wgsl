@@ -5,6 +5,7 @@
 // lattice: the pixel in its middle, and those of its upper and its left edge, which it shares with its neighbours.
 #import bindings
 #import camera
+#import lattice
 #import scene_depth
 
 @compute @workgroup_size(8, 8)
@@ -55,7 +56,7 @@ fn read(pixel: vec2u) -> Known {
     let index = pixel.y * frame.march_width + pixel.x;
     let value = clouds[index];
     let depth = cloud_depth[index];
-    let opacity = select(0.0, max(1.0 - value.a, 1e-6), depth >= 0.0);
+    let opacity = depth_weight(value.a, depth);
     return Known(value, opacity * vec2f(depth, 1.0), cloud_span[index], scene_at(pixel));
 }
 

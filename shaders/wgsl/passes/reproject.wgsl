@@ -1,22 +1,24 @@
 // Fills the picture from the subset of pixels that was marched, and from the frame before (nubis2015, "reprojection").
 // One invocation fills a cell. Its pixels have the same marched neighbours, and all but the same motion, so that these are
-// found, and the frame before is read, once for the sixteen of them: loads are all that this pass costs.
+// found, and the frame before is read, once for all of them: loads are all that this pass costs. In a sparse picture a pixel
+// here is one that is known (lattice.wgsl).
 #import bindings
 #import camera
 #import shell
+#import lattice
 #import scene_depth
 
-// Pixels of a cell in each direction (as in reproject.rs).
-const STRIDE = 4;
+// Pixels of a cell in each direction: 4, in a sparse picture 2 (reproject.rs).
+override STRIDE: i32 = 4;
 
 // How many standard deviations of its neighbourhood a moving pixel may be from its mean. Measured on a pan: 1.25 blurs
 // (error 13.0 %), 2 keeps what 4 keeps (11.7 and 11.4 %) and still catches ghosts.
 const SPREAD = 2.0;
 
-// Frames in which every pixel of a cell is marched once (as in reproject.rs). A pixel rests on so many when it has had its own
+// Frames in which every pixel of a cell is marched once. A pixel rests on so many when it has had its own
 // ray and has been followed since; before that on as many as it has been guessed in, from neighbours, and its value is their
 // mean.
-const ROUND = 16u;
+override ROUND: u32 = u32(STRIDE * STRIDE);
 
 // How many times as far as its nearest the user's scene may be around a cell, now and in the frame before. Past that
 // there is an edge, beside which neighbours and past say nothing of a pixel, as their rays have ended elsewhere.
@@ -57,13 +59,13 @@ fn reproject(@builtin(global_invocation_id) id: vec3u) {
     cell.distance = nearest_cloud(at);
 
     // Where the cloud seen here was in the frame before. Where no cloud is near, the sky stands still.
-    let centre = vec2f(cell.corner) + 0.5 * f32(STRIDE);
+    let centre = pixel_place(vec2f(cell.corner) + 0.5 * f32(STRIDE));
     let away = select(frame.far_distance, cell.distance, cell.distance >= 0.0);
     let before = away * view_direction(centre).xyz + frame.eye_motion - frame.cloud_motion;
     let was = previous_pixel(normalize(before));
     // What stands still is where it was, to the bit: a narrow view, a pole of a panorama or a wide picture turn the
     // rounding of a direction into a good part of a pixel.
-    let motion = select(shortest_way(was.xy - centre), vec2f(0.0), frame.moving == 0u);
+    let motion = select(shortest_way(was.xy - centre) / f32(spacing()), vec2f(0.0), frame.moving == 0u);
     cell.shift = vec2i(round(motion));
     cell.seen = was.z > 0.0 || frame.moving == 0u;
 
@@ -84,8 +86,10 @@ fn reproject(@builtin(global_invocation_id) id: vec3u) {
         let old = a * down.x + b * down.y + c * down.z + d * down.w;
         fill(cell, vec2i(0, y), old[0], alone);
         fill(cell, vec2i(1, y), old[1], alone);
-        fill(cell, vec2i(2, y), old[2], alone);
-        fill(cell, vec2i(3, y), old[3], alone);
+        if !SPARSE {
+            fill(cell, vec2i(2, y), old[2], alone);
+            fill(cell, vec2i(3, y), old[3], alone);
+        }
         if y == STRIDE - 1 {
             break;
         }
@@ -99,16 +103,17 @@ fn reproject(@builtin(global_invocation_id) id: vec3u) {
 // The frame before in the size of this one: what lies between its pixels.
 @compute @workgroup_size(8, 8)
 fn rescale(@builtin(global_invocation_id) id: vec3u) {
-    if id.x >= frame.width || id.y >= frame.height {
+    let now = vec2u(frame.width, frame.height);
+    if any(id.xy >= known_size(now)) {
         return;
     }
-    let size = vec2f(vec2u(frame.previous_width, frame.previous_height));
-    let at = (vec2f(id.xy) + 0.5) * size / vec2f(vec2u(frame.width, frame.height)) - 0.5;
+    let scale = vec2f(vec2u(frame.previous_width, frame.previous_height)) / vec2f(now);
+    let at = (pixel_place(vec2f(id.xy) + 0.5) * scale - 0.5) / f32(spacing());
     let corner = vec2i(floor(at));
     let f = at - floor(at);
     let above = mix(history[previous_index(corner)], history[previous_index(corner + vec2i(1, 0))], f.x);
     let below = mix(history[previous_index(corner + vec2i(0, 1))], history[previous_index(corner + 1)], f.x);
-    let index = id.y * frame.width + id.x;
+    let index = id.y * known_size(now).x + id.x;
     clouds[index] = mix(above, below, f.y);
     let nearest = previous_index(vec2i(round(at)));
     cloud_depth[index] = history_depth[nearest];
@@ -116,18 +121,34 @@ fn rescale(@builtin(global_invocation_id) id: vec3u) {
 }
 
 fn previous_index(pixel: vec2i) -> u32 {
-    let size = vec2i(vec2u(frame.previous_width, frame.previous_height));
-    let inside = vec2u(clamp(pixel, vec2i(0), size - 1));
-    return inside.y * frame.previous_width + inside.x;
+    let size = known_size(vec2u(frame.previous_width, frame.previous_height));
+    let inside = vec2u(clamp(pixel, vec2i(0), vec2i(size) - 1));
+    return inside.y * size.x + inside.x;
+}
+
+// Where in the picture a place among the known pixels is; both have the centres of theirs at half-integers.
+fn pixel_place(place: vec2f) -> vec2f {
+    return (place - 0.5) * f32(spacing()) + 0.5;
+}
+
+// The pixel of a cell that has been marched.
+fn own_pixel() -> vec2i {
+    return vec2i(vec2u(frame.subpixel_x, frame.subpixel_y) / spacing());
+}
+
+// Whether the frame before has a pixel.
+fn was_known(pixel: vec2i) -> bool {
+    let has = all(pixel >= vec2i(0)) && all(pixel < vec2i(known_size(vec2u(frame.width, frame.height))));
+    return select(in_picture(pixel), has && (CAMERA != FISHEYE || in_picture(i32(TILE) * pixel)), SPARSE);
 }
 
 // Fills a pixel of a cell, for what the frame before has in its place; `alone`, it is marched instead.
 fn fill(cell: Cell, place: vec2i, old: vec4f, alone: bool) {
     let pixel = cell.corner + place;
-    if pixel.x >= i32(frame.width) || pixel.y >= i32(frame.height) {
+    if any(pixel >= vec2i(known_size(vec2u(frame.width, frame.height)))) {
         return;
     }
-    let subpixel = vec2i(vec2u(frame.subpixel_x, frame.subpixel_y));
+    let subpixel = own_pixel();
     let is_fresh = all(place == subpixel);
 
     // Marched just now, or, without history, a smooth guess.
@@ -138,7 +159,7 @@ fn fill(cell: Cell, place: vec2i, old: vec4f, alone: bool) {
     var value = select(guess, cell.level[1], is_fresh);
     var value_depth = select(cell.distance, cell.own_distance, is_fresh);
     var length = select(1u, ROUND, is_fresh);
-    if !is_fresh && cell.seen && in_picture(pixel + cell.shift) && is_finite4(old) {
+    if !is_fresh && cell.seen && was_known(pixel + cell.shift) && is_finite4(old) {
         let past = history_length[pixel_index(pixel + cell.shift)];
         let kept = select(clamp(old, cell.low, cell.high), old, frame.moving == 0u);
         value = select(mix(kept, guess, 1.0 / f32(past + 1u)), kept, past == ROUND);
@@ -162,7 +183,7 @@ fn fill(cell: Cell, place: vec2i, old: vec4f, alone: bool) {
 
 // Whether the scene has an edge among the pixels of a cell, the marched ones around it, and those of the past that are read.
 fn has_scene_edge(at: vec2i, corner: vec2i, past_corner: vec2i) -> bool {
-    let size = vec2i(i32(frame.march_width), i32((frame.height + frame.stride - 1u) / frame.stride));
+    let size = vec2i(vec2u(frame.march_width, frame.sheet_rows));
     var near = NO_SCENE;
     var far = 0.0;
     var i = 0;
@@ -212,7 +233,7 @@ fn hats(offset: f32) -> vec3f {
 
 // Distance of the cloud nearest to the middle of a cell among the nine marched pixels around it, -1 if there is none.
 fn nearest_cloud(cell: vec2i) -> f32 {
-    let subpixel = vec2f(vec2u(frame.subpixel_x, frame.subpixel_y)) + 0.5;
+    let subpixel = vec2f(own_pixel()) + 0.5;
     var distance = -1.0;
     var nearest = 1e9;
     var i = 0;
@@ -234,18 +255,18 @@ fn nearest_cloud(cell: vec2i) -> f32 {
 }
 
 fn fresh_index(cell: vec2i) -> u32 {
-    let size = vec2i(i32(frame.march_width), i32((frame.height + frame.stride - 1u) / frame.stride));
+    let size = vec2i(vec2u(frame.march_width, frame.sheet_rows));
     let inside = vec2u(clamp(cell, vec2i(0), size - 1));
     return inside.y * frame.march_width + inside.x;
 }
 
 fn pixel_index(pixel: vec2i) -> u32 {
-    let size = vec2i(vec2u(frame.width, frame.height));
+    let size = vec2i(known_size(vec2u(frame.width, frame.height)));
     var inside = clamp(pixel, vec2i(0), size - 1);
-    if CAMERA == EQUIRECT {
+    if CAMERA == EQUIRECT && !SPARSE {
         inside.x = (pixel.x % size.x + size.x) % size.x;
     }
-    return u32(inside.y) * frame.width + u32(inside.x);
+    return u32(inside.y * size.x + inside.x);
 }
 
 // A row of the frame before, between the pixels across: four values from seven pixels.

@@ -1,7 +1,7 @@
 //! The clouds before the sky: what the caller gets.
 
 use super::march::Marched;
-use super::refine::{Refined, WIDEST};
+use super::refine::{COARSEST, Refined, WIDEST};
 use super::{Bindings, Scene};
 use crate::error::Result;
 use crate::frame::Frame;
@@ -9,8 +9,8 @@ use crate::gpu::{Gpu, Work};
 use crate::kernel::Variant;
 use crate::params::Quality;
 
-/// Pixels of a cell in each direction (as in composite.wgsl).
-pub(crate) const TILE: u32 = 4;
+/// Pixels of a cell in each direction (as in lattice.wgsl).
+pub(crate) const TILE: u32 = COARSEST;
 
 /// What a picture is composed of, and into.
 pub(crate) struct Parts<'a> {

@@ -14,6 +14,22 @@ use crate::params::Quality;
 pub(crate) const COARSEST: u32 = 4;
 pub(crate) const WIDEST: f32 = 0.5 * PI / 180.0;
 
+/// Whether the pixels of that lattice are all that is ever marched: where no contrast is too large to interpolate, and no scene of the
+/// user's has edges. The rest of the picture is interpolated where it is composed (composite.wgsl), cell by cell.
+pub(crate) fn is_sparse(frame: &Frame, quality: &Quality) -> bool {
+    quality.contrast >= 1.0 && frame.scene == 0 && coarsest(frame, quality) == COARSEST
+}
+
+/// How many pixels of a picture, or of a sheet, the clouds are known at (as in lattice.wgsl).
+pub(crate) fn known(size: [u32; 2], sparse: bool) -> [u32; 2] {
+    if sparse { size.map(|pixels| pixels.div_ceil(COARSEST) + 1) } else { size }
+}
+
+/// Pixels from one of those to the next.
+pub(crate) fn spacing(sparse: bool) -> u32 {
+    if sparse { COARSEST } else { 1 }
+}
+
 /// The pixels to be marched next.
 pub(crate) struct Refined {
     /// Their numbers in the sheet.
@@ -53,6 +69,11 @@ impl Refined {
         gpu.queue.write_buffer(&self.list, 0, bytemuck::cast_slice(&lattice));
         lattice.len() as u32
     }
+}
+
+/// Whether pixels between marched ones are looked at.
+pub(crate) fn is_needed(frame: &Frame, quality: &Quality) -> bool {
+    frame.sparse == 0 && coarsest(frame, quality) > 1
 }
 
 /// The distance to begin with; 1 marches every pixel.

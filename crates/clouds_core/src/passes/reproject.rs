@@ -1,4 +1,5 @@
-//! Temporal reprojection: one pixel in sixteen is marched, the others come from the frame before.
+//! Temporal reprojection: one pixel in sixteen is marched, the others come from the frame before. Of a sparse picture, whose
+//! clouds are known at one pixel in sixteen, one in four of those is.
 
 use super::march::Marched;
 use super::refine::Refined;
@@ -8,12 +9,14 @@ use crate::frame::Frame;
 use crate::gpu::{Gpu, Work};
 use crate::scene_depth::SceneTextures;
 
-/// One of this many pixels is marched in a frame, in each direction.
-pub(crate) const STRIDE: u32 = 4;
+/// One of this many pixels that are known is marched in a frame, in each direction.
+pub(crate) const fn stride(sparse: bool) -> u32 {
+    if sparse { 2 } else { 4 }
+}
 
 /// The order in which the sixteen pixels of a cell are marched: a Bayer matrix, so that any few of them in a row are
 /// spread over the cell.
-pub(crate) const ORDER: [[u32; 2]; ROUND as usize] = [
+const ORDER: [[u32; 2]; 16] = [
     [0, 0],
     [2, 2],
     [2, 0],
@@ -32,15 +35,30 @@ pub(crate) const ORDER: [[u32; 2]; ROUND as usize] = [
     [0, 3],
 ];
 
+/// Frames in which every pixel that is known is marched once.
+pub(crate) const fn round(sparse: bool) -> u32 {
+    stride(sparse) * stride(sparse)
+}
+
+/// Cells of a picture of so many known pixels.
+pub(crate) fn cells(known: [u32; 2], sparse: bool) -> [u32; 2] {
+    known.map(|pixels| pixels.div_ceil(stride(sparse)))
+}
+
+/// The pixel of a cell that a frame marches.
+pub(crate) fn subpixel(index: u32, sparse: bool) -> [u32; 2] {
+    // The first four are the corners of quarters of the cell, and sparse cells twice as wide.
+    let scale = if sparse { 2 } else { 1 };
+    ORDER[(index % round(sparse)) as usize].map(|place| scale * place)
+}
+
 /// A frame, and what it rests on.
 pub(crate) struct Followed {
     pub marched: Marched,
-    /// In how many frames each pixel has been guessed, or [`ROUND`] once it has had a ray of its own, and has been followed since.
+    /// In how many frames each pixel has been guessed, or all of a round once it has had a ray of its own, and has been followed
+    /// since.
     pub length: wgpu::Buffer,
 }
-
-/// Frames in which every pixel is marched once.
-pub const ROUND: u32 = STRIDE * STRIDE;
 
 impl Followed {
     pub fn new(gpu: &Gpu, pixels: u64) -> Self {
@@ -48,8 +66,8 @@ impl Followed {
     }
 
     /// Each pixel has been marched.
-    pub fn begin(&self, gpu: &Gpu) {
-        let lengths = vec![ROUND; self.length.size() as usize / 4];
+    pub fn begin(&self, gpu: &Gpu, sparse: bool) {
+        let lengths = vec![round(sparse); self.length.size() as usize / 4];
         gpu.queue.write_buffer(&self.length, 0, bytemuck::cast_slice(&lengths));
     }
 
@@ -98,7 +116,7 @@ pub(crate) fn run(
     work.dispatch(
         &*gpu.kernel("reproject", "reproject", scene.variant)?,
         &bindings,
-        [frame.march_width, frame.rows.div_ceil(STRIDE), 1],
+        [frame.march_width, frame.rows.div_ceil(stride(frame.sparse > 0)), 1],
     )
 }
 
@@ -112,5 +130,6 @@ pub(crate) fn rescale(
     out: &Followed,
 ) -> Result<()> {
     let bindings = [scene.bindings.as_slice(), &out.bindings(), &before.past()].concat();
-    work.dispatch(&*gpu.kernel("reproject", "rescale", scene.variant)?, &bindings, [frame.width, frame.height, 1])
+    let [width, height] = frame.known();
+    work.dispatch(&*gpu.kernel("reproject", "rescale", scene.variant)?, &bindings, [width, height, 1])
 }

@@ -1,0 +1,21 @@
+// Which pixels the marched clouds are known at: all of them or, in a sparse picture, the corners of cells of four by four.
+#import bindings
+
+// Pixels from one corner of a cell to the next (as in refine.rs).
+const TILE = 4u;
+
+// Pixels from one that is known to the next.
+fn spacing() -> u32 {
+    return select(1u, TILE, SPARSE);
+}
+
+// How many are known in a picture of `size` pixels. Those of a sparse one go up to a cell beyond its right and lower edges, so
+// that each pixel lies between four.
+fn known_size(size: vec2u) -> vec2u {
+    return select(size, (size + TILE - 1u) / TILE + 1u, SPARSE);
+}
+
+// By what a depth counts between known pixels: opacity, and next to none where there is next to none.
+fn depth_weight(transmittance: f32, depth: f32) -> f32 {
+    return select(0.0, max(1.0 - transmittance, 1e-6), depth >= 0.0);
+}

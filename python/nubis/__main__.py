@@ -69,7 +69,7 @@ def _parser() -> argparse.ArgumentParser:
         "--quality",
         default="balanced",
         metavar="NAME",
-        help="numerical method, such as draft, balanced or high (default: balanced)",
+        help="numerical method, such as preview, draft, balanced or high (default: balanced)",
     )
     render.add_argument(
         "--adapter",

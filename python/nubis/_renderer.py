@@ -57,8 +57,9 @@ def adapters() -> list[Adapter]:
 def quality(name: str) -> Quality:
     """Return the numerical method of that name, to look at or to change.
 
-    Names: ``"draft"``, ``"balanced"``, ``"high"``, ``"reference"`` (converged, slow), and the
-    published settings of the sources, ``"nubis2015"``, ``"thesis2018"``, ``"vsu2022"``.
+    Names: ``"preview"`` (soft: one pixel in sixteen is marched), ``"draft"``, ``"balanced"``,
+    ``"high"``, ``"reference"`` (converged, slow), and the published settings of the sources,
+    ``"nubis2015"``, ``"thesis2018"``, ``"vsu2022"``.
     """
     if not isinstance(name, str):
         raise ParameterError(f"quality = {name!r} is not allowed: it must be a name or a Quality")
@@ -272,7 +273,10 @@ class Renderer:
 
         One pixel in sixteen is marched per frame, the others follow the clouds from the frame
         before; the first frame and the first after a cut are stills. A static shot converges to
-        the still in which every pixel is marched (``contrast=0``). With light model ``"path"`` or
+        the still in which every pixel is marched (``contrast=0``). Where pixels are less than an
+        eighth of a degree wide, ``contrast=1``, as in ``"preview"``, marches one in sixty-four and
+        follows one in sixteen, between which frames are interpolated, as its stills are: a static
+        shot is the still. With light model ``"path"`` or
         quality ``"reference"`` every frame is a still, and a static shot goes on tracing paths:
         each frame has less noise.
 
@@ -325,7 +329,8 @@ class Renderer:
 
         Shape (height, width). 16 is a ray of its own, in this frame or in one since which it has
         been followed; less is the mean of guesses from the rays around it in so many frames: what
-        has just come into the picture begins with 1. None where nothing is reprojected: before the
+        has just come into the picture begins with 1. Where one pixel in sixteen is followed, it is
+        what the first of its sixteen rests on, 4 for each frame. None where nothing is reprojected: before the
         first frame, without clouds, and with methods that converge or trace paths.
         """
         return self._core.history_length()

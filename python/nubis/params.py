@@ -534,10 +534,11 @@ class Quality(Block):
     contrast : float
         Largest contrast between neighbouring rays, past which the pixels between them get rays of
         their own. Of pixels less than an eighth of a degree wide one in sixteen is marched first,
-        of a quarter one in four, of wider ones every one; 0 marches every one of any width. What is
-        behind the clouds, sky, ground and high clouds seen from below, is then worked out at every
-        fourth of the narrowest pixels, and where it bends by a tenth of this, at edges too; 0 works
-        out every one. Allowed: a number from 0 to 1.
+        of a quarter one in four, of wider ones every one; 0 marches every one of any width, and 1
+        none but those, so that an animation follows those alone. What is behind the clouds, sky,
+        ground and high clouds seen from below, is then worked out at every fourth of the narrowest
+        pixels, and where it bends by a tenth of this, at edges too; 0 works out every one. Allowed:
+        a number from 0 to 1.
     jitter : bool
         Whether each ray starts at a blue-noise offset of up to one step. Allowed: True or False.
     view_distance : float

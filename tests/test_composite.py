@@ -192,6 +192,18 @@ def test_what_opaque_clouds_hide_is_not_missed():
         np.testing.assert_allclose(image, picture(layers), rtol=1e-5)
 
 
+@pytest.mark.parametrize("name", ["preview", "draft"])
+def test_opaque_clouds_hide_what_is_behind(name):
+    """The horizon, too, between whose ground and high clouds nothing is smooth."""
+    camera, params = nubis.scenes["in_cloud"]
+    make = nubis.Renderer(890, 626, quality=name)
+    clouds = make.render(camera, params, background=None)
+    opaque = clouds[..., 3] == 1
+    assert opaque[366:372].mean() > 0.2  # the horizon
+    whole = make.render(camera, params)
+    np.testing.assert_allclose(whole[opaque], clouds[opaque], rtol=1e-5)
+
+
 @pytest.mark.parametrize("size", [(1, 1), (2, 7), (9, 1), (5, 6), (23, 18)])
 def test_sizes_that_four_does_not_divide(size):
     camera = looking(0.0, 12.0, 0.1 * size[1])

@@ -12,7 +12,11 @@ fn spacing() -> u32 {
 // How many are known in a picture of `size` pixels. Those of a sparse one go up to a cell beyond its right and lower edges, so
 // that each pixel lies between four.
 fn known_size(size: vec2u) -> vec2u {
-    return select(size, (size + TILE - 1u) / TILE + 1u, SPARSE);
+    return known_size_by(size, spacing());
+}
+
+fn known_size_by(size: vec2u, spacing: u32) -> vec2u {
+    return select(size, (size + spacing - 1u) / spacing + 1u, spacing > 1u);
 }
 
 // By what a depth counts between known pixels: opacity, and next to none where there is next to none.

@@ -94,6 +94,10 @@ params! {
         previous_width: u32 = 1;
         /// Its height.
         previous_height: u32 = 1;
+        /// Pixels from one that its clouds were known at to the next.
+        previous_spacing: u32 = 1;
+        /// Frames in which each of those was marched once.
+        previous_round: u32 = 1;
         /// How far the eye has moved since the frame before, m.
         eye_motion: [f32; 3] = [0.0, 0.0, 0.0];
         /// How far the wind has carried the clouds since the frame before, m.
@@ -321,11 +325,16 @@ fn leap_scale(params: &Params) -> f32 {
 }
 
 impl Frame {
+    /// What the camera and the size of a picture say of it.
+    pub fn seen_by(camera: &Camera, [width, height]: [u32; 2]) -> Self {
+        let mut frame = Self { width, height, rows: height, march_width: width, ..Self::default() };
+        frame.set_camera(camera);
+        frame
+    }
+
     /// The frame of a picture of `size` pixels seen by `camera` at `time` seconds.
     pub fn new(camera: &Camera, params: &Params, time: f64, size: [u32; 2]) -> Self {
-        let mut frame =
-            Self { width: size[0], height: size[1], rows: size[1], march_width: size[0], ..Self::default() };
-        frame.set_camera(camera);
+        let mut frame = Self::seen_by(camera, size);
         frame.set_planet(camera.eye, params);
         frame.set_wind(camera.eye, params, time);
         frame.set_volume(camera.eye, params);

@@ -240,15 +240,12 @@ impl Renderer {
     }
 
     /// Makes pictures of another size and by another method from now on; what has been baked stays, and an animation goes on
-    /// in the new size.
+    /// with what it has been following.
     pub fn set(&mut self, width: u32, height: u32, quality: Quality) -> Result<()> {
         quality.check()?;
         check_size([width, height])?;
         self.size = [width, height];
-        if self.quality != quality {
-            self.quality = quality;
-            self.cut();
-        }
+        self.quality = quality;
         self.refining = None;
         Ok(())
     }
@@ -464,14 +461,15 @@ impl Renderer {
         let last = last.filter(|last| !last.is_cut(camera, params, time));
         // A frame without clouds leaves no history, nor do the edges of a scene in a picture of another size.
         let last = last.filter(|last| last.frame.cloudless == frame.cloudless);
+        let bare = |last: &Shot| last.scene.is_none() && scene_depth.is_none();
         let fits = |last: &Shot| [last.frame.width, last.frame.height] == [width, height];
-        let last = last.filter(|last| fits(last) || (last.scene.is_none() && scene_depth.is_none()));
+        let last = last.filter(|last| bare(last) || fits(last));
         frame.scene = u32::from(scene_depth.is_some() || last.as_ref().is_some_and(|last| last.scene.is_some()));
         let sparse = refine::is_sparse(&frame, quality);
         frame.sparse = u32::from(sparse);
-        let last = last.filter(|last| last.frame.sparse == frame.sparse);
+        let last = last.filter(|last| bare(last) || last.frame.sparse == frame.sparse);
         let old = self.animation.take_if(|old| (old.size, old.sparse) != ([width, height], sparse));
-        let resized = old.map(|old| (old.before, old.size));
+        let resized = old.map(|old| (old.before, old.size, old.sparse));
         let animation = self.animation.get_or_insert_with(|| Animation::new(gpu, [width, height], sparse));
         let index = last.as_ref().map_or(0, |last| last.index + 1);
         // Where a scene was and is no more, or is and was not, there is nothing.
@@ -508,8 +506,10 @@ impl Renderer {
 
         let mut ctx = Context { gpu, uniforms: scene.uniforms, variant: scene.variant, timings, interrupt };
         let Animation { refined, fresh, before, now, composed, backdrop, scene_before, .. } = &*animation;
-        if let (Some((old, size)), Some(_)) = (&resized, &last) {
+        if let (Some((old, size, was_sparse)), Some(_)) = (&resized, &last) {
             [frame.previous_width, frame.previous_height] = *size;
+            frame.previous_spacing = refine::spacing(*was_sparse);
+            frame.previous_round = reproject::round(*was_sparse);
             scene.uniforms.upload_frame(gpu, &frame);
             let mut work = gpu.work();
             reproject::rescale(gpu, &mut work, &scene, &frame, old, before)?;

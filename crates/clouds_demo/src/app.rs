@@ -307,7 +307,9 @@ impl App {
                     ui.selectable_value(&mut self.sight, sight, sight.name());
                 }
             });
-            egui::ComboBox::from_label("beside").selected_text(self.beside.name()).show_ui(ui, |ui| {
+            // All of them, without scrolling.
+            let menu = egui::ComboBox::from_label("beside").selected_text(self.beside.name()).height(400.0);
+            menu.show_ui(ui, |ui| {
                 for beside in Beside::all() {
                     ui.selectable_value(&mut self.beside, beside, beside.name());
                 }
@@ -620,9 +622,9 @@ impl App {
         if rect.width() < 1.0 || rect.height() < 1.0 {
             return;
         }
-        let (camera, moving_quality) = match (self.flight.camera(), Quality::named("draft")) {
-            (Ok(camera), Ok(draft)) => (camera, draft),
-            (Err(error), _) | (_, Err(error)) => {
+        let camera = match self.flight.camera() {
+            Ok(camera) => camera,
+            Err(error) => {
                 self.notice = error.to_string();
                 return;
             }
@@ -632,7 +634,6 @@ impl App {
             params: self.params.clone(),
             time: self.time,
             quality: self.quality.clone(),
-            moving_quality,
             window,
             exposure: self.exposure,
             tone_map: self.tone_map,

@@ -35,8 +35,6 @@ pub struct Wish {
     pub time: f64,
     /// The method of stills.
     pub quality: Quality,
-    /// That of moving pictures.
-    pub moving_quality: Quality,
     /// Pixels of the view.
     pub window: [u32; 2],
     /// Stops.
@@ -229,7 +227,7 @@ struct Work<'a> {
 impl<'a> Work<'a> {
     fn new(gpu: &'a Gpu, adapter: Option<&str>) -> Result<Self> {
         let renderer = || Renderer::new(16, 16, Quality::named("draft")?, adapter);
-        let share = if gpu.info.kind == "cpu" { 0.3 } else { 1.0 };
+        let share = if gpu.info.kind == "cpu" { 0.45 } else { 1.0 };
         let [moving, still] = [renderer()?, renderer()?];
         Ok(Self {
             gpu,
@@ -314,12 +312,16 @@ impl<'a> Work<'a> {
         if at_rest && wish.sight != Sight::History {
             return self.paint_still(wish, wish.window, &wish.quality, &interrupt);
         }
-        let size = wish.wanted.map_or(wish.window, |_| self.resolution.of(wish.window));
-        if !matches!(wish.sight, Sight::Picture | Sight::History) {
-            return self.paint_still(wish, size, &wish.moving_quality, &interrupt);
+        // A layer has each of its pixels.
+        let animated = matches!(wish.sight, Sight::Picture | Sight::History);
+        let sparse = |size| animated && Quality::named("preview").is_ok_and(|preview| preview.is_sparse(camera, size));
+        let (size, name) = wish.wanted.map_or((wish.window, "draft"), |_| self.resolution.of(wish.window, sparse));
+        let quality = Quality::named(name)?;
+        if !animated {
+            return self.paint_still(wish, size, &quality, &interrupt);
         }
         let screen = self.screen(wish, size)?;
-        self.moving.set(size[0], size[1], wish.moving_quality.clone())?;
+        self.moving.set(size[0], size[1], quality)?;
         if wish.sight == Sight::History {
             self.moving.animate(camera, params, *time, true, None, &interrupt)?;
             screen.write_pixels(self.gpu, &history_pixels(&self.moving.history_length()?, size))?;

@@ -14,7 +14,11 @@ fn adapter() -> Option<String> {
 }
 
 fn renderer(width: u32, height: u32) -> Renderer {
-    Renderer::new(width, height, Quality::named("draft").expect("is one"), adapter().as_deref()).expect("opens")
+    renderer_by("draft", width, height)
+}
+
+fn renderer_by(name: &str, width: u32, height: u32) -> Renderer {
+    Renderer::new(width, height, Quality::named(name).expect("is one"), adapter().as_deref()).expect("opens")
 }
 
 fn shot(i: u32) -> (Camera, Params, f64) {
@@ -82,27 +86,39 @@ fn stretch(image: &[f32], [w, h]: [u32; 2], [width, height]: [u32; 2]) -> Vec<f3
 
 #[test]
 fn an_animation_goes_on_in_another_size() {
+    goes_on("draft", [96, 56], "draft", [192, 112]);
+    goes_on("draft", [192, 112], "draft", [144, 84]);
+}
+
+/// `preview` follows one in sixteen of the larger pictures' pixels, as they are narrow, and each of the smaller ones'.
+#[test]
+fn an_animation_goes_on_with_other_pixels_known() {
+    goes_on("preview", [640, 500], "preview", [720, 562]);
+    goes_on("preview", [640, 500], "draft", [320, 250]);
+    goes_on("draft", [320, 250], "preview", [640, 500]);
+    goes_on("preview", [640, 500], "draft", [640, 500]);
+}
+
+fn goes_on(first: &str, [w, h]: [u32; 2], then: &str, [width, height]: [u32; 2]) {
     let make = |renderer: &mut Renderer, i| {
         let (camera, params, time) = shot(i);
         renderer.animate(&camera, &params, time, true, None, &|| Ok(())).expect("is made")
     };
-    for sizes in [[(96, 56), (192, 112)], [(192, 112), (144, 84)]] {
-        let [(w, h), (width, height)] = sizes;
-        let mut animated = renderer(w, h);
-        for i in 0..17 {
-            make(&mut animated, i);
-        }
-        animated.set(width, height, Quality::named("draft").expect("is one")).expect("is allowed");
-        let got = make(&mut animated, 17);
-        let fresh = make(&mut renderer(width, height), 17);
-        let off = error(&got, &fresh);
-        // What a still of the old size knows of the new one, between its pixels.
-        let old = make(&mut renderer(w, h), 17);
-        let stretched = stretch(&old, [w, h], [width, height]);
-        let most = error(&stretched, &fresh);
-        // The history is that and a sixteenth of fresh pixels; without, it would be a guess between those.
-        assert!(off < 1.25 * most && most < 0.25, "{sizes:?}: {off}, stretched {most}");
-        // No still is made instead: that would be a hitch.
-        assert!(off > 0.2 * most, "{sizes:?}: {off}, stretched {most}");
+    let mut animated = renderer_by(first, w, h);
+    for i in 0..17 {
+        make(&mut animated, i);
     }
+    animated.set(width, height, Quality::named(then).expect("is one")).expect("is allowed");
+    let got = make(&mut animated, 17);
+    let fresh = make(&mut renderer_by(then, width, height), 17);
+    let off = error(&got, &fresh);
+    // What a still of the old size knows of the new one, between its pixels.
+    let old = make(&mut renderer_by(first, w, h), 17);
+    let stretched = stretch(&old, [w, h], [width, height]);
+    let most = error(&stretched, &fresh);
+    // The history is that and a part of fresh pixels; without, it would be a guess between those.
+    let case = format!("{first} {w} x {h}, {then} {width} x {height}");
+    assert!(off < 1.25 * most && most < 0.25, "{case}: {off}, stretched {most}");
+    // No still is made instead: that would be a hitch.
+    assert!(off > 0.2 * most, "{case}: {off}, stretched {most}");
 }

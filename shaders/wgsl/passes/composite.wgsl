@@ -268,8 +268,11 @@ fn composite_cells(
         if smooth_cell && in_sheet(first, i) {
             let layer = layers * corner_shares(i);
             let sky = behind * corner_shares(i);
-            // Before the ground there is the lack of light in the shadows.
-            let high = Layer(select(layer.rgb, vec3f(0.0), grounded), layer.a, sky.w);
+            // Before the ground there is the lack of light in the shadows; and what is hidden may have both at its corners.
+            var high = Layer(select(layer.rgb, vec3f(0.0), grounded), layer.a, sky.w);
+            if hidden {
+                high = Layer(vec3f(0.0), 1.0, 0.0);
+            }
             put_behind(sheet_index(first, i), marched_layer(id.xy, sparse, i), high, sky.rgb + select(vec3f(0.0), layer.rgb, grounded));
         }
         i++;

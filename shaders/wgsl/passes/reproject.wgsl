@@ -100,7 +100,7 @@ fn reproject(@builtin(global_invocation_id) id: vec3u) {
     }
 }
 
-// The frame before in the size of this one: what lies between its pixels.
+// The frame before in the size of this one, and known at as many pixels: what lies between its own.
 @compute @workgroup_size(8, 8)
 fn rescale(@builtin(global_invocation_id) id: vec3u) {
     let now = vec2u(frame.width, frame.height);
@@ -108,7 +108,7 @@ fn rescale(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let scale = vec2f(vec2u(frame.previous_width, frame.previous_height)) / vec2f(now);
-    let at = (pixel_place(vec2f(id.xy) + 0.5) * scale - 0.5) / f32(spacing());
+    let at = (pixel_place(vec2f(id.xy) + 0.5) * scale - 0.5) / f32(frame.previous_spacing);
     let corner = vec2i(floor(at));
     let f = at - floor(at);
     let above = mix(history[previous_index(corner)], history[previous_index(corner + vec2i(1, 0))], f.x);
@@ -117,11 +117,13 @@ fn rescale(@builtin(global_invocation_id) id: vec3u) {
     clouds[index] = mix(above, below, f.y);
     let nearest = previous_index(vec2i(round(at)));
     cloud_depth[index] = history_depth[nearest];
-    followed[index] = history_length[nearest];
+    // A ray of its own, or as many guesses.
+    let past = history_length[nearest];
+    followed[index] = select(min(past, ROUND - 1u), ROUND, past == frame.previous_round);
 }
 
 fn previous_index(pixel: vec2i) -> u32 {
-    let size = known_size(vec2u(frame.previous_width, frame.previous_height));
+    let size = known_size_by(vec2u(frame.previous_width, frame.previous_height), frame.previous_spacing);
     let inside = vec2u(clamp(pixel, vec2i(0), vec2i(size) - 1));
     return inside.y * size.x + inside.x;
 }

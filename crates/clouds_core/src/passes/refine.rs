@@ -5,6 +5,7 @@ use std::f32::consts::PI;
 use super::march::Marched;
 use super::{Bindings, Scene};
 use crate::error::Result;
+use crate::camera::Camera;
 use crate::frame::Frame;
 use crate::gpu::{Gpu, Work};
 use crate::params::Quality;
@@ -18,6 +19,14 @@ pub(crate) const WIDEST: f32 = 0.5 * PI / 180.0;
 /// user's has edges. The rest of the picture is interpolated where it is composed (composite.wgsl), cell by cell.
 pub(crate) fn is_sparse(frame: &Frame, quality: &Quality) -> bool {
     quality.contrast >= 1.0 && frame.scene == 0 && coarsest(frame, quality) == COARSEST
+}
+
+impl Quality {
+    /// Whether one in sixteen is all that is marched of a picture of so many pixels, and that an animation follows: with a `contrast` of 1,
+    /// where pixels are less than an eighth of a degree wide. A scene of the user's has all its pixels.
+    pub fn is_sparse(&self, camera: &Camera, size: [u32; 2]) -> bool {
+        self.tolerance == 0.0 && is_sparse(&Frame::seen_by(camera, size), self)
+    }
 }
 
 /// How many pixels of a picture, or of a sheet, the clouds are known at (as in lattice.wgsl).

@@ -120,7 +120,7 @@ pub(crate) fn run(
     )
 }
 
-/// Makes of the frame `before`, which had another size, one of the size of `frame`.
+/// Makes of the frame `before`, which had another size or was known at other pixels, one like `frame`.
 pub(crate) fn rescale(
     gpu: &Gpu,
     work: &mut Work<'_>,

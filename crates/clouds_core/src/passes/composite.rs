@@ -33,9 +33,9 @@ pub(crate) struct Composed {
 impl Composed {
     pub fn new(gpu: &Gpu, pixels: u64) -> Self {
         Self {
-            image: gpu.buffer("image", 16 * pixels),
-            sky: gpu.buffer("sky", 16 * pixels),
-            depth: gpu.buffer("depth", 4 * pixels),
+            image: gpu.picture_buffer("image", 16 * pixels),
+            sky: gpu.picture_buffer("sky", 16 * pixels),
+            depth: gpu.picture_buffer("depth", 4 * pixels),
         }
     }
 

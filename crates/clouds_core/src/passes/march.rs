@@ -21,7 +21,7 @@ impl Marched {
         Self {
             clouds: gpu.buffer("clouds", 16 * pixels),
             depth: gpu.buffer("cloud_depth", 4 * pixels),
-            samples: gpu.buffer("samples", 4 * pixels),
+            samples: gpu.picture_buffer("samples", 4 * pixels),
         }
     }
 

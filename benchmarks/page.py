@@ -113,7 +113,7 @@ def _against(found: Row) -> str:
                 )
         lines.append(line)
     means = ["geometric mean"]
-    named = ["the same, of `draft` and `balanced` alone"]
+    named = ["the same, of `preview`, `draft` and `balanced` alone"]
     for name in names:
         means.append(_mean([row["ratio"] for row in ratios if row["published"] == name]))
         named.append(_mean([row["named_ratio"] for row in ratios if row["published"] == name]))

@@ -30,16 +30,10 @@ RESULTS = Path(__file__).parent / "results"
 PUBLISHED = "nubis2015", "thesis2018", "vsu2022"
 #: What stands against them: the fastest that errs no more than they do.
 OURS = {
-    "one ray in 16": nubis.quality("draft").replace(
-        steps_zenith=54, steps_horizon=128, light_steps=6, light_share=0.3, contrast=1.0
-    ),
-    "one in 16, finer": nubis.quality("draft").replace(
-        steps_zenith=161,
-        steps_horizon=384,
-        big_step=6,
-        light_steps=16,
-        light_share=0.1,
-        contrast=1.0,
+    "preview, coarser": nubis.quality("preview").replace(light_steps=6, light_share=0.3),
+    "preview": nubis.quality("preview"),
+    "preview, finer": nubis.quality("preview").replace(
+        steps_zenith=161, steps_horizon=384, big_step=6, light_steps=16, light_share=0.1
     ),
     "draft": nubis.quality("draft"),
     "balanced": nubis.quality("balanced"),
@@ -60,7 +54,7 @@ OURS = {
     ),
 }
 #: Those of them that users call by name.
-NAMED = "draft", "balanced"
+NAMED = "preview", "draft", "balanced"
 #: What all are compared with: at this size `reference` would take hours. It errs by 1 % itself, in
 #: `storm` by 7 %, in `sunset` by 28 % (docs/accuracy.md).
 TRUTH = nubis.quality("high")
@@ -68,8 +62,9 @@ TRUTH = nubis.quality("high")
 ANCHORS = "fair_weather", "sunset", "above"
 #: What is measured of `high`, too, which takes half a minute a picture.
 AIMED = "clear sky", "night", "a tenth"
-#: In what an animation is made at 1920x1080: the coarsest first.
-FLOWN = "one ray in 16", "draft", "balanced", "high"
+#: In what an animation is made at 1920x1080, and in the views of the anchors: the coarsest first.
+FLOWN = "preview", "draft", "balanced", "high"
+ANCHORED = "preview", "draft"
 FRAMES = 26  # of an animation; the first is a still, the second compiles
 
 
@@ -208,10 +203,10 @@ def animation(
 ) -> Row:
     """A flight at 60 m/s: the time of a frame, and how far frames and stills are from each other.
 
-    And how far the last of both is from `high`, whose stills have hardly any noise. That frame is
-    saved among the `plots`.
+    And how far the last of both is from `high`, whose stills have hardly any noise. That frame of
+    the flight is saved among the `plots`.
     """
-    method = OURS[quality] if quality in OURS else nubis.quality(quality)
+    method = nubis.quality(quality)
     shots = list(_flight(scene))
     frames = nubis.Renderer(*size, quality=method).animate(shots)
     stills = nubis.Renderer(*size, quality=method)
@@ -230,7 +225,7 @@ def animation(
                 truth = [_difference(frame, high), _difference(alone, high)]
     if plots:
         plots.mkdir(parents=True, exist_ok=True)
-        nubis.save(plots / f"{scene}-frame.png", frame[..., :3])
+        nubis.save(plots / f"{scene}-{quality}-frame.png", frame[..., :3])
     return {
         "scene": scene,
         "size": size,
@@ -281,10 +276,14 @@ def run(
     if "animation" in parts:
         large = (160, 90) if quick else (1920, 1080)
         anchor = (96, 54) if quick else (960, 540)
-        found["animation"] = [animation("fair_weather", large, quality) for quality in FLOWN]
+        found["animation"] = [
+            animation("fair_weather", large, quality, plots=plots if quality == "preview" else None)
+            for quality in FLOWN
+        ]
         found["anchors"] = [
-            {"still": still(anchor, OURS["draft"], *nubis.scenes[scene], repeats)}
-            | animation(scene, anchor, "draft", plots=plots)
+            {"still": still(anchor, nubis.quality(quality), *nubis.scenes[scene], repeats)}
+            | animation(scene, anchor, quality, plots=plots if quality == "draft" else None)
+            for quality in ANCHORED
             for scene in ANCHORS
         ]
     return found

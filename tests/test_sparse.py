@@ -208,6 +208,34 @@ def test_other_projections(kind):
     assert twin.relative_rmse(last, still) < 0.1
 
 
+@pytest.mark.parametrize("size", [(1, 1), (2, 7), (5, 6), (3, 200), (200, 3), (8, 8)])
+def test_small_and_narrow_pictures(size):
+    """Of fewer pixels than a cell has, too: in frames as in stills."""
+    make = nubis.Renderer(*size, quality=PREVIEW)
+    shot, other = (
+        (Camera.look_at(eye, TARGET, (0, 0, 1), 0.1 * size[1]), SKY, 0.0)
+        for eye in (EYE, (9, 9, 200))
+    )
+    still = make.render(*shot[:2])
+    every = nubis.Renderer(*size, quality=EVERY).render(*shot[:2])
+    assert twin.relative_rmse(still, every) < 0.3
+    frames = list(make.animate([shot] * 3 + [other] * 3))
+    assert all(frame.tobytes() == still.tobytes() for frame in frames[:3])
+    assert twin.relative_rmse(frames[-1], make.render(*other[:2])) < 0.1
+
+
+@pytest.mark.parametrize("altitude", [9000.0, 40_000.0])
+def test_from_above_the_high_clouds(altitude):
+    """Each pixel is composed by itself there, before and behind the layer that is seen twice."""
+    eye = np.array([0.0, 0.0, altitude])
+    camera = Camera.look_at(eye, np.add(eye, (300, 3000, -1500)), (0, 0, 1), 13)
+    got, rays = (
+        nubis.Renderer(*SIZE, quality=quality).render(camera, SKY) for quality in (PREVIEW, EVERY)
+    )
+    assert twin.relative_rmse(got, rays) < 0.2
+    assert got.mean() == pytest.approx(rays.mean(), rel=0.01)
+
+
 def test_a_scene_has_each_ray_at_its_edges():
     """It is followed pixel by pixel, and what comes after it begins with a still."""
     camera, params, _ = next(shots(1))
@@ -230,7 +258,9 @@ def test_it_takes_a_sixteenth_of_the_buffers():
     for name, quality in (("preview", PREVIEW), ("every", EVERY)):
         make = nubis.Renderer(*SIZE, quality=quality)
         list(make.animate([(camera, params, 0.0)] * 2))
-        bytes_of[name] = {name: size for owner, name, size in make._core.memory() if owner == "animation"}
+        bytes_of[name] = {
+            name: size for owner, name, size in make._core.memory() if owner == "animation"
+        }
     for name in ("clouds", "cloud_depth", "followed", "active_rays"):
         assert bytes_of["preview"][name] < bytes_of["every"][name] / 14
 

@@ -330,8 +330,9 @@ class Renderer:
         Shape (height, width). 16 is a ray of its own, in this frame or in one since which it has
         been followed; less is the mean of guesses from the rays around it in so many frames: what
         has just come into the picture begins with 1. Where one pixel in sixteen is followed, it is
-        what the first of its sixteen rests on, 4 for each frame. None where nothing is reprojected: before the
-        first frame, without clouds, and with methods that converge or trace paths.
+        what the first of its sixteen rests on, 4 for each frame. None where nothing is
+        reprojected: before the first frame, without clouds, and with methods that converge or
+        trace paths.
         """
         return self._core.history_length()
 

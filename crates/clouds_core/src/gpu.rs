@@ -565,22 +565,23 @@ impl Work<'_> {
     /// Brings `bytes` of a buffer back; [`Work::submit`] returns them in the order of the calls.
     pub fn download(&mut self, buffer: &wgpu::Buffer, offset: u64, bytes: u64) {
         if buffer.usage().contains(wgpu::BufferUsages::MAP_READ) {
-            self.downloads.push(Download { buffer: buffer.clone(), range: offset..offset + bytes, view: None });
+            self.downloads.push(Download::of(buffer.clone(), offset..offset + bytes));
             return;
         }
         let staging = self.gpu.staging(bytes);
         self.encoder.copy_buffer_to_buffer(buffer, offset, &staging, 0, bytes);
-        self.downloads.push(Download::of(staging));
+        self.downloads.push(Download::of(staging, 0..bytes));
     }
 
     /// The same for a texture of half floats and its mips, whose rows are padded.
     pub fn download_texture(&mut self, texture: &wgpu::Texture) {
-        let staging = self.gpu.staging(texture_bytes(texture, COPIED));
+        let bytes = texture_bytes(texture, COPIED);
+        let staging = self.gpu.staging(bytes);
         for (source, layout, size) in mips(texture, COPIED) {
             let target = wgpu::TexelCopyBufferInfo { buffer: &staging, layout };
             self.encoder.copy_texture_to_buffer(source, target, size);
         }
-        self.downloads.push(Download::of(staging));
+        self.downloads.push(Download::of(staging, 0..bytes));
     }
 
     /// Runs everything, waits for it, adds to `timings` and returns the downloads.
@@ -603,12 +604,11 @@ impl Work<'_> {
         }
         let index = gpu.queue.submit([self.encoder.finish()]);
         let mut downloads = self.downloads;
-        for Download { buffer, range, .. } in &downloads {
-            // Failures come out of get_mapped_range.
-            buffer.map_async(wgpu::MapMode::Read, range.clone(), |_| {});
+        for download in &mut downloads {
+            download.map();
         }
         gpu.wait(index, interrupt)?;
-        for Download { buffer, range, view } in &mut downloads {
+        for Download { buffer, range, view, .. } in &mut downloads {
             let found = buffer.get_mapped_range(range.clone());
             *view = Some(found.map_err(|error| Error::Device(error.to_string()))?);
         }
@@ -670,13 +670,21 @@ pub(crate) fn texture_bytes(texture: &wgpu::Texture, padded: u32) -> u64 {
 pub(crate) struct Download {
     buffer: wgpu::Buffer,
     range: Range<u64>,
+    /// Whether it is mapped, or will be.
+    mapped: bool,
     /// What is mapped of it, once it is.
     view: Option<wgpu::BufferView>,
 }
 
 impl Download {
-    fn of(staging: wgpu::Buffer) -> Self {
-        Self { range: 0..staging.size(), buffer: staging, view: None }
+    fn of(buffer: wgpu::Buffer, range: Range<u64>) -> Self {
+        Self { buffer, range, mapped: false, view: None }
+    }
+
+    /// Asks for it; failures come out when it is there.
+    fn map(&mut self) {
+        self.buffer.map_async(wgpu::MapMode::Read, self.range.clone(), |_| {});
+        self.mapped = true;
     }
 
     /// The bytes as numbers.
@@ -688,6 +696,9 @@ impl Download {
 impl Drop for Download {
     fn drop(&mut self) {
         self.view = None;
-        self.buffer.unmap();
+        // What was interrupted before it was submitted is not.
+        if self.mapped {
+            self.buffer.unmap();
+        }
     }
 }

@@ -377,9 +377,9 @@ params! {
         min_transmittance: f32 = 0.01, in 0..=0.5 "";
         /// Largest contrast between neighbouring rays, past which the pixels between them get rays of their own. Of pixels
         /// less than an eighth of a degree wide one in sixteen is marched first, of a quarter one in four, of wider ones
-        /// every one; 0 marches every one of any width, and 1 none but those, so that an animation follows those alone. What is behind the clouds, sky, ground and high clouds seen from
-        /// below, is then worked out at every fourth of the narrowest pixels, and where it bends by a tenth of this, at
-        /// edges too; 0 works out every one.
+        /// every one; 0 marches every one of any width, and 1 none but those, so that an animation follows those alone. What
+        /// is behind the clouds, sky, ground and high clouds seen from below, is then worked out at every fourth of the
+        /// narrowest pixels, and where it bends by a tenth of this, at edges too; 0 works out every one.
         contrast: f32 = 0.3, in 0..=1 "";
         /// Whether each ray starts at a blue-noise offset of up to one step.
         jitter: bool = true;
@@ -662,7 +662,8 @@ impl Weather {
 
 impl Quality {
     /// The numerical methods that have a name. The last three are the published settings of the sources.
-    pub const NAMES: [&str; 8] = ["preview", "draft", "balanced", "high", "reference", "nubis2015", "thesis2018", "vsu2022"];
+    pub const NAMES: [&str; 8] =
+        ["preview", "draft", "balanced", "high", "reference", "nubis2015", "thesis2018", "vsu2022"];
 
     /// The method called `name`.
     pub fn named(name: &str) -> Result<Self> {

@@ -2,10 +2,11 @@
 
 mod read;
 
+use std::cell::Cell;
 use std::sync::Arc;
 
 use clouds_core::color::{TONE_MAPS, to_srgb8};
-use clouds_core::{Camera, Gpu, Params, Quality, Renderer, Screen};
+use clouds_core::{Camera, Error, Gpu, Params, Quality, Renderer, Screen};
 use clouds_demo::preset;
 use glam::DVec3;
 
@@ -82,6 +83,33 @@ fn stretch(image: &[f32], [w, h]: [u32; 2], [width, height]: [u32; 2]) -> Vec<f3
         }
     }
     stretched
+}
+
+/// Wherever it is: the next picture is that of a renderer to which nothing has happened.
+#[test]
+fn what_is_interrupted_leaves_nothing_behind() {
+    let [mut renderer, mut other] = [renderer(64, 40), renderer(64, 40)];
+    let mut expected = None;
+    for patience in 0.. {
+        let left = Cell::new(patience);
+        let interrupt = || {
+            left.set(left.get() - 1);
+            if left.get() < 0 { Err(Error::Interrupted) } else { Ok(()) }
+        };
+        let (camera, params, time) = shot(0);
+        let interrupted = renderer.animate(&camera, &params, time, true, None, &interrupt).is_err();
+        // The first frame after it is a still.
+        renderer.cut();
+        let image = renderer.animate(&camera, &params, time, true, None, &|| Ok(())).expect("is made");
+        let expected = expected
+            .get_or_insert_with(|| other.animate(&camera, &params, time, true, None, &|| Ok(())).expect("is made"));
+        assert!(image == *expected, "interrupted after {patience} questions");
+        renderer.cut();
+        if !interrupted {
+            assert!(patience >= 3, "{patience}");
+            return;
+        }
+    }
 }
 
 #[test]

@@ -4,8 +4,8 @@ use std::f32::consts::PI;
 
 use super::march::Marched;
 use super::{Bindings, Scene};
-use crate::error::Result;
 use crate::camera::Camera;
+use crate::error::Result;
 use crate::frame::Frame;
 use crate::gpu::{Gpu, Work};
 use crate::params::Quality;

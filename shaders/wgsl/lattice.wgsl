@@ -9,12 +9,13 @@ fn spacing() -> u32 {
     return select(1u, TILE, SPARSE);
 }
 
-// How many are known in a picture of `size` pixels. Those of a sparse one go up to a cell beyond its right and lower edges, so
-// that each pixel lies between four.
-fn known_size(size: vec2u) -> vec2u {
-    return known_size_by(size, spacing());
+// How many are known in this picture.
+fn known_size() -> vec2u {
+    return known_size_by(vec2u(frame.width, frame.height), spacing());
 }
 
+// How many are known in a picture of `size` pixels. Those of a sparse one go up to a cell beyond its right and lower edges, so
+// that each pixel lies between four.
 fn known_size_by(size: vec2u, spacing: u32) -> vec2u {
     return select(size, (size + spacing - 1u) / spacing + 1u, spacing > 1u);
 }

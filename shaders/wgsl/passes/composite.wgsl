@@ -73,7 +73,7 @@ struct SparseCell {
 fn sparse_cell(cell: vec2u) -> SparseCell {
     var found: SparseCell;
     if SPARSE && !CLOUDLESS {
-        let columns = cell_columns() + 1u;
+        let columns = known_size().x;
         let first = cell.y * columns + cell.x;
         found.clouds = mat4x4f(clouds[first], clouds[first + 1u], clouds[first + columns], clouds[first + columns + 1u]);
         found.distance = mat4x2f(
@@ -240,11 +240,10 @@ fn composite_cells(
     var hidden = false;
     if !LAYERS && !CLOUDLESS {
         hidden = (edge || fine) && (!HIGH || (!VOLUME && frame.shell_top <= params.high_clouds.altitude));
-    }
-    if SPARSE && !LAYERS && !CLOUDLESS {
         let c = sparse.clouds;
-        hidden = hidden && all(vec4f(c[0].a, c[1].a, c[2].a, c[3].a) == vec4f(0.0));
-    } else if !LAYERS && !CLOUDLESS {
+        hidden = hidden && (!SPARSE || all(vec4f(c[0].a, c[1].a, c[2].a, c[3].a) == vec4f(0.0)));
+    }
+    if !SPARSE && !LAYERS && !CLOUDLESS {
         let last = vec2u(frame.width, frame.sheet_row + frame.rows) - 1u;
         var i = 0u;
         // It leaves soon: most cells show something, and those that do not ask are never hidden. Once false, it stays so,

@@ -103,17 +103,17 @@ fn reproject(@builtin(global_invocation_id) id: vec3u) {
 // The frame before in the size of this one, and known at as many pixels: what lies between its own.
 @compute @workgroup_size(8, 8)
 fn rescale(@builtin(global_invocation_id) id: vec3u) {
-    let now = vec2u(frame.width, frame.height);
-    if any(id.xy >= known_size(now)) {
+    let size = known_size();
+    if any(id.xy >= size) {
         return;
     }
-    let scale = vec2f(vec2u(frame.previous_width, frame.previous_height)) / vec2f(now);
+    let scale = vec2f(vec2u(frame.previous_width, frame.previous_height)) / vec2f(vec2u(frame.width, frame.height));
     let at = (pixel_place(vec2f(id.xy) + 0.5) * scale - 0.5) / f32(frame.previous_spacing);
     let corner = vec2i(floor(at));
     let f = at - floor(at);
     let above = mix(history[previous_index(corner)], history[previous_index(corner + vec2i(1, 0))], f.x);
     let below = mix(history[previous_index(corner + vec2i(0, 1))], history[previous_index(corner + 1)], f.x);
-    let index = id.y * known_size(now).x + id.x;
+    let index = id.y * size.x + id.x;
     clouds[index] = mix(above, below, f.y);
     let nearest = previous_index(vec2i(round(at)));
     cloud_depth[index] = history_depth[nearest];
@@ -140,14 +140,14 @@ fn own_pixel() -> vec2i {
 
 // Whether the frame before has a pixel.
 fn was_known(pixel: vec2i) -> bool {
-    let has = all(pixel >= vec2i(0)) && all(pixel < vec2i(known_size(vec2u(frame.width, frame.height))));
+    let has = all(pixel >= vec2i(0)) && all(pixel < vec2i(known_size()));
     return select(in_picture(pixel), has && (CAMERA != FISHEYE || in_picture(i32(TILE) * pixel)), SPARSE);
 }
 
 // Fills a pixel of a cell, for what the frame before has in its place; `alone`, it is marched instead.
 fn fill(cell: Cell, place: vec2i, old: vec4f, alone: bool) {
     let pixel = cell.corner + place;
-    if any(pixel >= vec2i(known_size(vec2u(frame.width, frame.height)))) {
+    if any(pixel >= vec2i(known_size())) {
         return;
     }
     let subpixel = own_pixel();
@@ -263,7 +263,7 @@ fn fresh_index(cell: vec2i) -> u32 {
 }
 
 fn pixel_index(pixel: vec2i) -> u32 {
-    let size = vec2i(known_size(vec2u(frame.width, frame.height)));
+    let size = vec2i(known_size());
     var inside = clamp(pixel, vec2i(0), size - 1);
     if CAMERA == EQUIRECT && !SPARSE {
         inside.x = (pixel.x % size.x + size.x) % size.x;

@@ -46,7 +46,7 @@ override LIGHT_CHEAP: bool = true; // there are light samples that do not
 @group(0) @binding(61) var air_light: texture_2d<f32>; // scattered light by altitude and sun, see SCATTERED (passes/multiscatter)
 @group(0) @binding(62) var air_share: texture_3d<f32>; // share of the sky before a distance, by direction (passes/sky)
 @group(0) @binding(10) var<storage, read_write> sky_light: array<vec4f, 4>; // what the sky gives to clouds (passes/sky)
-// The same for `composite`: a load from storage costs lavapipe a loop over the lanes. Not for all: as a uniform of number 10
+// The same for where it decides little: a load from storage costs lavapipe a loop over the lanes. Not for all: as a uniform of number 10
 // it crashed lavapipe (Mesa 22.3.6) in `path`, where it decides a branch; with a number after all others it did not.
 @group(0) @binding(41) var<uniform> sky_light_uniform: array<vec4f, 4>;
 @group(0) @binding(11) var blue_noise: texture_2d<f32>; // 64 x 64 ranks in [0, 1), void and cluster
@@ -86,6 +86,7 @@ override LIGHT_CHEAP: bool = true; // there are light samples that do not
 @group(0) @binding(18) var<storage, read_write> fresh_depth: array<f32>;
 @group(0) @binding(19) var<storage, read_write> history: array<vec4f>;
 @group(0) @binding(20) var<storage, read_write> history_depth: array<f32>;
+@group(0) @binding(58) var<storage, read_write> cells: array<CellPast>;
 // How much each pixel rests on, in frames (passes/reproject): in the frame before, and in this one.
 @group(0) @binding(56) var<storage, read_write> history_length: array<u32>;
 @group(0) @binding(57) var<storage, read_write> followed: array<u32>;
@@ -101,6 +102,19 @@ override LIGHT_CHEAP: bool = true; // there are light samples that do not
 @group(0) @binding(35) var<storage, read_write> active_rays: array<u32>;
 @group(0) @binding(36) var<storage, read_write> progress: array<vec2u>; // iterations in this dispatch, 1 when done
 @group(0) @binding(37) var<storage, read_write> uncertainty: array<vec4f>; // of the radiance of each pixel
+
+// What the frame before says of the ray of a cell (passes/reproject).
+struct CellPast {
+    predicted: vec4f, // as `clouds`
+    gain: vec3f, // by how much the clouds around have become brighter
+    error: f32, // contrast between ray and prediction
+    motion: vec2f, // pixels to where the cell was
+    distance: f32, // m to its nearest cloud, -1 if there is none
+    ray_distance: f32, // m to that of its ray, -1 if there is none
+    approach: f32, // m that this has come nearer
+    glare: f32, // relative change of the light that is scattered toward the eye
+    source: u32, // what the prediction rests on
+}
 
 // A ray on its way to convergence (passes/reference).
 struct ReferenceRay {

@@ -43,10 +43,8 @@ params! {
         spans: u32 = 0;
         /// 1 to put the clouds before the sky, 0 to return them alone.
         background: u32 = 1;
-        /// 1 when anything but the jitter differs from the frame before.
+        /// 1 where eye, view, clouds or the user's scene have moved since the frame before.
         moving: u32 = 0;
-        /// Shift of the blue noise from frame to frame.
-        jitter_shift: f32 = 0.0;
 
         /// Threads among which the device shares the workgroups of a dispatch, 1 unless it is a processor (workgroups.wgsl).
         threads: u32 = 1;
@@ -164,6 +162,8 @@ params! {
         sky_scale: f32 = 1024.0;
         /// Unit vector toward the sun.
         sun_direction: [f32; 3] = [0.0, 0.0, 1.0];
+        /// The same of the frame before.
+        previous_sun: [f32; 3] = [0.0, 0.0, 1.0];
         /// The middle of the spot to keep clear, relative to the eye, m.
         clear_at: [f32; 2] = [0.0, 0.0];
         /// Its radius, m.
@@ -600,6 +600,7 @@ impl Frame {
         self.previous_forward = previous.forward;
         self.previous_tan_half_fov = previous.tan_half_fov;
         self.previous_half_fov = previous.half_fov;
+        self.previous_sun = previous.sun_direction;
         self.eye_motion = eye_motion.as_vec3().to_array();
         self.cloud_motion = carried.drift().as_vec3().to_array();
     }

@@ -28,7 +28,7 @@ use crate::passes::phase::PhaseTable;
 use crate::passes::profile::Profile;
 use crate::passes::rays::Rays;
 use crate::passes::refine::{COARSEST, Refined};
-use crate::passes::reproject::{Followed, History};
+use crate::passes::reproject::{Current, Followed, History};
 use crate::passes::shadow::{self, GroundShadow};
 use crate::passes::sky::Sky;
 use crate::passes::sun_volume::SunVolume;
@@ -164,7 +164,7 @@ struct Animation {
     size: [u32; 2],
     sparse: bool,
     refined: Refined,
-    fresh: Marched,
+    current: Current,
     before: Followed,
     now: Followed,
     composed: Composed,
@@ -226,8 +226,8 @@ impl Renderer {
             add("still", [marched.bindings(), refined.bindings(), composed.bindings(), backdrop.bindings()].concat());
             add("still", rays.as_ref().map_or(Vec::new(), |rays| rays.bindings("rays")));
         }
-        if let Some(Animation { refined, fresh, before, now, composed, backdrop, scene_before, .. }) = &self.animation {
-            add("animation", [fresh.bindings(), refined.bindings(), composed.bindings(), backdrop.bindings()].concat());
+        if let Some(Animation { refined, current, before, now, composed, backdrop, scene_before, .. }) = &self.animation {
+            add("animation", [current.bindings(), refined.bindings(), composed.bindings(), backdrop.bindings()].concat());
             add("animation", vec![("scene_before", scene_before.depth())]);
             add("animation", [before.bindings(), now.bindings()].concat());
         }
@@ -492,20 +492,15 @@ impl Renderer {
         }
         if let Some(last) = &last {
             frame.set_previous(&last.frame, camera.eye - last.camera.eye, &Carried::new(params, last.time, time));
-            frame.moving = u32::from(last.camera != *camera || last.params != *params || last.time != time);
-            frame.moving |= u32::from(had != has || resized.is_some());
+            frame.moving = u32::from(last.camera != *camera || frame.cloud_motion != [0.0; 3] || had != has);
         }
-        // While anything moves, each round of the sixteen pixels moves the blue noise on by the golden ratio; a static
-        // shot keeps the still's, and so becomes the still.
-        let round = if frame.moving > 0 && !sparse { index / ROUND } else { 0 };
-        frame.jitter_shift = (f64::from(round) * 0.618_033_988_749_895).fract() as f32;
         let variant = Variant::of_frame(params, quality, &frame);
         let scene = gpu.compiling(&Method::March.kernels(params, quality, &frame, variant, false), || {
             world.run(gpu, params, &frame, (camera.eye, time), quality, timings, interrupt)
         })?;
 
         let mut ctx = Context { gpu, uniforms: scene.uniforms, variant: scene.variant, timings, interrupt };
-        let Animation { refined, fresh, before, now, composed, backdrop, scene_before, .. } = &*animation;
+        let Animation { refined, current, before, now, composed, backdrop, scene_before, .. } = &*animation;
         if let (Some((old, size, was_sparse)), Some(_)) = (&resized, &last) {
             [frame.previous_width, frame.previous_height] = *size;
             frame.previous_spacing = refine::spacing(*was_sparse);
@@ -515,36 +510,21 @@ impl Renderer {
             reproject::rescale(gpu, &mut work, &scene, &frame, old, before)?;
             work.submit(ctx.timings, interrupt)?;
         }
-        if frame.cloudless > 0 {
-            frame.sheet_rows = height;
-        } else if last.is_none() {
-            frame.sheet_rows = height;
-            let mut frame = frame.of_known();
-            march_sheet(&mut ctx, &scene, &mut frame, quality, &mut self.march_pace, refined, &now.marched)?;
-            now.begin(gpu, sparse);
-        } else {
-            frame.stride = reproject::stride(sparse) * refine::spacing(sparse);
-            [frame.subpixel_x, frame.subpixel_y] = reproject::subpixel(index, sparse);
-            [frame.march_width, frame.sheet_rows] = reproject::cells(frame.known(), sparse);
-            march_sheet(&mut ctx, &scene, &mut frame, quality, &mut self.march_pace, refined, fresh)?;
+        frame.sheet_rows = height;
+        let mut follows = last.is_some() && frame.cloudless == 0;
+        if follows {
+            let past = History { clouds: before, scene: scene_before };
+            let pace = (&mut self.march_pace, &mut self.reproject_pace);
+            follows = follow(&mut ctx, &scene, &frame, quality, index, pace, refined, current, &past, now)?;
         }
-        if last.is_some() && frame.cloudless == 0 {
-            let old = History { clouds: before, scene: scene_before };
-            let mut rays = 0;
-            gpu.queue.write_buffer(&refined.count, 0, &[0; 4]);
-            let known = frame.known();
-            in_bands(&mut self.reproject_pace, gpu, &scene, &mut frame, known, |frame| {
-                let mut work = gpu.work();
-                reproject::run(gpu, &mut work, &scene, frame, fresh, &old, refined, now)?;
-                work.download(&refined.count, 0, 4);
-                rays = work.submit(timings, interrupt)?[0].numbers()[0];
-                Ok(())
-            })?;
-            // What the past says nothing about.
-            let mut frame = Frame { stride: 1, subpixel_x: 0, subpixel_y: 0, march_width: width, ..frame.clone() };
-            frame.spans = 0;
-            let mut ctx = Context { gpu, uniforms: scene.uniforms, variant: scene.variant, timings, interrupt };
-            march_listed(&mut ctx, &scene, &mut frame, rays, &mut self.march_pace, refined, &now.marched)?;
+        if !follows && frame.cloudless == 0 {
+            let mut still = frame.of_known();
+            march_sheet(&mut ctx, &scene, &mut still, quality, &mut self.march_pace, refined, &now.marched)?;
+            still.lattice = refine::coarsest(&still, quality);
+            scene.uniforms.upload_frame(gpu, &still);
+            let mut work = gpu.work();
+            reproject::begin(gpu, &mut work, &scene, &still, now)?;
+            work.submit(ctx.timings, interrupt)?;
         }
         frame.rows = height;
         let parts = Parts { marched: &now.marched, backdrop, refined, out: composed };
@@ -992,7 +972,7 @@ impl Animation {
             size,
             sparse,
             refined: Refined::new(gpu, known),
-            fresh: Marched::new(gpu, cells),
+            current: Current::new(gpu, cells),
             before: Followed::new(gpu, known),
             now: Followed::new(gpu, known),
             composed: Composed::new(gpu, count(size)),
@@ -1108,6 +1088,64 @@ fn march_sheet(
         frame.lattice /= 2;
         frame.spans = 1;
     }
+}
+
+/// Largest share of the pixels of a frame that are marched one by one: a still, which marches an eighth to a fifth of them, is
+/// nearer to the truth then and takes no longer.
+const MOST_LISTED: f32 = 1.0 / 12.0;
+
+/// Makes a frame of rays of its own, one in each cell, and of the frame before. Returns whether that was worth while: if not,
+/// `now` is not filled.
+#[expect(clippy::too_many_arguments, reason = "what a frame is made of")]
+fn follow(
+    ctx: &mut Context<'_>,
+    scene: &Scene<'_>,
+    frame: &Frame,
+    quality: &Quality,
+    index: u32,
+    (march_pace, reproject_pace): (&mut Pace, &mut Pace),
+    refined: &Refined,
+    current: &Current,
+    past: &History<'_>,
+    now: &Followed,
+) -> Result<bool> {
+    let (gpu, interrupt) = (ctx.gpu, ctx.interrupt);
+    let sparse = frame.sparse > 0;
+    let mut cells = frame.clone();
+    cells.stride = reproject::stride(sparse) * refine::spacing(sparse);
+    [cells.subpixel_x, cells.subpixel_y] = reproject::subpixel(index, sparse);
+    [cells.march_width, cells.sheet_rows] = reproject::cells(frame.known(), sparse);
+    march_sheet(ctx, scene, &mut cells, quality, march_pace, refined, &current.marched)?;
+
+    let mut votes = 0;
+    let mut rays = 0;
+    in_bands(reproject_pace, gpu, scene, &mut cells, frame.known(), |cells| {
+        let mut work = gpu.work();
+        let first = cells.first_row == 0;
+        if first {
+            work.clear(&refined.count);
+            reproject::validate(gpu, &mut work, scene, cells, current, past, refined)?;
+            work.download(&refined.count, 0, 4);
+            work.clear(&refined.count);
+        }
+        reproject::run(gpu, &mut work, scene, cells, current, past, refined, now)?;
+        work.download(&refined.count, 0, 4);
+        let counts = work.submit(ctx.timings, interrupt)?;
+        let counts: Vec<u32> = counts.iter().map(|count| count.numbers()[0]).collect();
+        if first {
+            votes = counts[0].cast_signed();
+        }
+        rays = counts[counts.len() - 1];
+        Ok(())
+    })?;
+    // What neither rays nor past say anything about.
+    let mut listed = frame.of_known();
+    let most = MOST_LISTED * count(frame.known()) as f32;
+    if votes > 0 || (refine::is_needed(&listed, quality) && rays as f32 > most) {
+        return Ok(false);
+    }
+    march_listed(ctx, scene, &mut listed, rays, march_pace, refined, &now.marched)?;
+    Ok(true)
 }
 
 /// Marches the first `rays` pixels of a list.

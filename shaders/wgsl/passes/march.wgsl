@@ -65,7 +65,8 @@ struct Cloud {
 // an offset for each step would cost twenty times the error (docs/numerics.md).
 fn ray_offset(pixel: vec2u) -> f32 {
     let rank = textureLoad(blue_noise, pixel % 64u, 0).r;
-    return select(0.5, fract(rank + frame.jitter_shift), quality.jitter > 0u);
+    // The largest rank is 1 as a half float.
+    return select(0.5, fract(rank), quality.jitter > 0u);
 }
 
 // The steps of a ray: `count` of them over `length` metres, growing with distance by `growth` per metre.

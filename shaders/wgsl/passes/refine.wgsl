@@ -5,6 +5,7 @@
 // lattice: the pixel in its middle, and those of its upper and its left edge, which it shares with its neighbours.
 #import bindings
 #import camera
+#import contrast
 #import lattice
 #import scene_depth
 
@@ -78,7 +79,7 @@ struct Looks {
 }
 
 fn looks(k: Known) -> Looks {
-    return Looks(vec2f(max(max(k.value.r, k.value.g), k.value.b)), k.value.aa, k.span, k.scene);
+    return Looks(vec2f(brightness(k.value)), k.value.aa, k.span, k.scene);
 }
 
 fn joined(a: Looks, b: Looks) -> Looks {
@@ -95,14 +96,7 @@ fn settle(pixel: vec2u, around: Looks, between: Known) {
     // Rays that the user's scene ends say nothing of what lies behind it: each ray beside it is marched, and all of it.
     let open = min(around.scene, scene_at(pixel)) >= NO_SCENE;
     cloud_span[index] = select(vec2f(0.0, 1e30), around.span, open);
-    // Light counts by what it is seen against: the brightest corner, or the sky behind it.
-    let backdrop = max(max(sky_light[0].r, sky_light[0].g), sky_light[0].b);
-    let against = max(around.light.y, around.transmittance.y * backdrop);
-    let contrast = max(
-        around.transmittance.y - around.transmittance.x,
-        (around.light.y - around.light.x) / max(against, 1e-30),
-    );
-    if contrast > quality.contrast || !open {
+    if contrast(around.light, around.transmittance) > quality.contrast || !open {
         active_rays[atomicAdd(&ray_count, 1u)] = index;
     } else {
         let distance = between.distance;

@@ -55,20 +55,13 @@ pub(crate) fn subpixel(index: u32, sparse: bool) -> [u32; 2] {
 /// A frame, and what it rests on.
 pub(crate) struct Followed {
     pub marched: Marched,
-    /// In how many frames each pixel has been guessed, or all of a round once it has had a ray of its own, and has been followed
-    /// since.
+    /// Frames that each pixel has been followed since it was interpolated, or all of a round once it has had a ray of its own.
     pub length: wgpu::Buffer,
 }
 
 impl Followed {
     pub fn new(gpu: &Gpu, pixels: u64) -> Self {
         Self { marched: Marched::new(gpu, pixels), length: gpu.buffer("followed", 4 * pixels) }
-    }
-
-    /// Each pixel has been marched.
-    pub fn begin(&self, gpu: &Gpu, sparse: bool) {
-        let lengths = vec![round(sparse); self.length.size() as usize / 4];
-        gpu.queue.write_buffer(&self.length, 0, bytemuck::cast_slice(&lengths));
     }
 
     pub fn bindings(&self) -> Bindings<'_> {
@@ -85,6 +78,34 @@ impl Followed {
     }
 }
 
+/// The rays of a frame, one in each cell, and what the frame before says of them.
+pub(crate) struct Current {
+    pub marched: Marched,
+    cells: wgpu::Buffer,
+}
+
+/// Bytes of `CellPast` (bindings.wgsl).
+const CELL_BYTES: u64 = 64;
+
+impl Current {
+    pub fn new(gpu: &Gpu, cells: u64) -> Self {
+        Self { marched: Marched::new(gpu, cells), cells: gpu.buffer("cells", CELL_BYTES * cells) }
+    }
+
+    /// What is kept of them on the device.
+    pub fn bindings(&self) -> Bindings<'_> {
+        [self.marched.bindings(), vec![("cells", (&self.cells).into())]].concat()
+    }
+
+    fn read(&self) -> Bindings<'_> {
+        vec![
+            ("fresh", (&self.marched.clouds).into()),
+            ("fresh_depth", (&self.marched.depth).into()),
+            ("cells", (&self.cells).into()),
+        ]
+    }
+}
+
 /// The frame before.
 pub(crate) struct History<'a> {
     /// Its clouds.
@@ -93,7 +114,33 @@ pub(crate) struct History<'a> {
     pub scene: &'a SceneTextures,
 }
 
-/// Fills `out` from the `fresh` subset and from the frame `before`, for the band of `frame`; lists in `refined` the pixels
+/// Makes `out`, a still, the history of the frames after it.
+pub(crate) fn begin(gpu: &Gpu, work: &mut Work<'_>, scene: &Scene<'_>, frame: &Frame, out: &Followed) -> Result<()> {
+    let bindings = [scene.bindings.as_slice(), &out.bindings()].concat();
+    let [width, height] = frame.known();
+    work.dispatch(&*gpu.kernel("reproject", "begin", scene.variant)?, &bindings, [width, height, 1])
+}
+
+/// Asks the frame `before` for the rays of this one, and compares: `refined` counts votes for a still, less those for going on.
+pub(crate) fn validate(
+    gpu: &Gpu,
+    work: &mut Work<'_>,
+    scene: &Scene<'_>,
+    frame: &Frame,
+    current: &Current,
+    before: &History<'_>,
+    refined: &Refined,
+) -> Result<()> {
+    let ours = [before.clouds.past(), current.read(), refined.bindings()].concat();
+    let bindings = [scene.bindings.as_slice(), &ours].concat();
+    for entry in ["predict", "validate"] {
+        let kernel = gpu.kernel("reproject", entry, scene.variant)?;
+        work.dispatch(&*kernel, &bindings, [frame.march_width, frame.sheet_rows, 1])?;
+    }
+    Ok(())
+}
+
+/// Fills `out` from the `current` rays and from the frame `before`, for the band of `frame`; lists in `refined` the pixels
 /// that are to be marched, as neither says anything about them.
 #[expect(clippy::too_many_arguments, reason = "what fills a frame")]
 pub(crate) fn run(
@@ -101,17 +148,13 @@ pub(crate) fn run(
     work: &mut Work<'_>,
     scene: &Scene<'_>,
     frame: &Frame,
-    fresh: &Marched,
+    current: &Current,
     before: &History<'_>,
     refined: &Refined,
     out: &Followed,
 ) -> Result<()> {
-    let ours = vec![
-        ("fresh", (&fresh.clouds).into()),
-        ("fresh_depth", (&fresh.depth).into()),
-        ("scene_before", before.scene.depth()),
-    ];
-    let ours = [before.clouds.past(), out.bindings(), refined.bindings(), ours].concat();
+    let past = [before.clouds.past(), vec![("scene_before", before.scene.depth())]].concat();
+    let ours = [past, out.bindings(), refined.bindings(), current.read()].concat();
     let bindings = [scene.bindings.as_slice(), &ours].concat();
     work.dispatch(
         &*gpu.kernel("reproject", "reproject", scene.variant)?,

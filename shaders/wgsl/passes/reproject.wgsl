@@ -100,13 +100,14 @@ fn predict(@builtin(global_invocation_id) id: vec3u) {
     let corner = pixel + vec2i(floor(past.motion)) - 1;
     let across = catmull_rom(fract(past.motion.x));
     let down = catmull_rom(fract(past.motion.y));
-    let rows = mat4x4f(
-        history_across(corner, across),
-        history_across(corner + vec2i(0, 1), across),
-        history_across(corner + vec2i(0, 2), across),
-        history_across(corner + vec2i(0, 3), across),
-    );
-    past.predicted = select(fresh[cell_index(at)], limited(rows * down, corner + 1, fract(past.motion)), inside);
+    let f = fract(past.motion);
+    let a = history_row(corner, across, f.x);
+    let b = history_row(corner + vec2i(0, 1), across, f.x);
+    let c = history_row(corner + vec2i(0, 2), across, f.x);
+    let d = history_row(corner + vec2i(0, 3), across, f.x);
+    let cubic = a.cubic[0] * down.x + b.cubic[0] * down.y + c.cubic[0] * down.z + d.cubic[0] * down.w;
+    let from_history = limited(cubic, mix(b.linear[0], c.linear[0], f.y), b, c, 0u);
+    past.predicted = select(fresh[cell_index(at)], from_history, inside);
     let seen = (was.z > 0.0 || frame.moving == 0u) && was_known(shifted) && is_finite4(past.predicted);
     let length = history_length[pixel_index(shifted)];
     past.source = select(UNSEEN, select(GUESSED, MARCHED, inside && length == ROUND), seen || !inside);
@@ -205,20 +206,20 @@ fn reproject(@builtin(global_invocation_id) id: vec3u) {
     let f = fract(motion);
     let across = catmull_rom(f.x);
     let down = catmull_rom(f.y);
-    var a = history_row(corner, across);
-    var b = history_row(corner + vec2i(0, 1), across);
-    var c = history_row(corner + vec2i(0, 2), across);
+    var a = history_row(corner, across, f.x);
+    var b = history_row(corner + vec2i(0, 1), across, f.x);
+    var c = history_row(corner + vec2i(0, 2), across, f.x);
     var y = 0;
     // Left at its end: lavapipe runs a loop that is left at its start once more, for nothing.
     loop {
-        let d = history_row(corner + vec2i(0, y + 3), across);
-        let old = a * down.x + b * down.y + c * down.z + d * down.w;
-        let inner = corner + vec2i(1, y + 1);
-        fill(cell, vec2i(0, y), limited(old[0], inner, f), alone);
-        fill(cell, vec2i(1, y), limited(old[1], inner + vec2i(1, 0), f), alone);
+        let d = history_row(corner + vec2i(0, y + 3), across, f.x);
+        let cubic = a.cubic * down.x + b.cubic * down.y + c.cubic * down.z + d.cubic * down.w;
+        let linear = b.linear * (1.0 - f.y) + c.linear * f.y;
+        fill(cell, vec2i(0, y), limited(cubic[0], linear[0], b, c, 0u), alone);
+        fill(cell, vec2i(1, y), limited(cubic[1], linear[1], b, c, 1u), alone);
         if !SPARSE {
-            fill(cell, vec2i(2, y), limited(old[2], inner + vec2i(2, 0), f), alone);
-            fill(cell, vec2i(3, y), limited(old[3], inner + vec2i(3, 0), f), alone);
+            fill(cell, vec2i(2, y), limited(cubic[2], linear[2], b, c, 2u), alone);
+            fill(cell, vec2i(3, y), limited(cubic[3], linear[3], b, c, 3u), alone);
         }
         if y == STRIDE - 1 {
             break;
@@ -315,17 +316,12 @@ fn quarter(numbers: vec4f, place: vec2i) -> f32 {
 
 // The cubic interpolation of the history as far toward it from the linear one as all channels stay within those of the four
 // pixels around: past them there are rings along edges, and clouds that are black where radiance and transmittance
-// overshoot by different shares. `corner` is the first of the four.
-fn limited(cubic: vec4f, corner: vec2i, f: vec2f) -> vec4f {
-    let a = history[pixel_index(corner)];
-    let b = history[pixel_index(corner + vec2i(1, 0))];
-    let c = history[pixel_index(corner + vec2i(0, 1))];
-    let d = history[pixel_index(corner + vec2i(1, 1))];
-    let linear = mix(mix(a, b, f.x), mix(c, d, f.x), f.y);
-    let low = min(min(a, b), min(c, d));
-    let high = max(max(a, b), max(c, d));
+// overshoot by different shares. `above` and `below` are the rows of those four, `x` is the column.
+fn limited(cubic: vec4f, linear: vec4f, above: HistoryRow, below: HistoryRow, x: u32) -> vec4f {
     let beyond = cubic - linear;
-    let room = select(low - linear, high - linear, beyond > vec4f(0.0));
+    let low = min(above.low[x], below.low[x]) - linear;
+    let high = max(above.high[x], below.high[x]) - linear;
+    let room = select(low, high, beyond > vec4f(0.0));
     let share = select(vec4f(1.0), room / beyond, abs(beyond) > abs(room));
     return linear + min(min(share.x, share.y), min(share.z, share.w)) * beyond;
 }
@@ -538,19 +534,15 @@ fn pixel_index(pixel: vec2i) -> u32 {
     return u32(inside.y * size.x + inside.x);
 }
 
-// The frame before between four pixels in a row.
-fn history_across(at: vec2i, weights: vec4f) -> vec4f {
-    let pixels = mat4x4f(
-        history[pixel_index(at)],
-        history[pixel_index(at + vec2i(1, 0))],
-        history[pixel_index(at + vec2i(2, 0))],
-        history[pixel_index(at + vec2i(3, 0))],
-    );
-    return pixels * weights;
+// Four pixels of a row of the frame before, between its own across, from seven.
+struct HistoryRow {
+    cubic: mat4x4f,
+    linear: mat4x4f,
+    low: mat4x4f, // the lesser of the two around each
+    high: mat4x4f,
 }
 
-// The same for four pixels in a row, from seven.
-fn history_row(at: vec2i, weights: vec4f) -> mat4x4f {
+fn history_row(at: vec2i, weights: vec4f, f: f32) -> HistoryRow {
     let p0 = history[pixel_index(at)];
     let p1 = history[pixel_index(at + vec2i(1, 0))];
     let p2 = history[pixel_index(at + vec2i(2, 0))];
@@ -558,11 +550,16 @@ fn history_row(at: vec2i, weights: vec4f) -> mat4x4f {
     let p4 = history[pixel_index(at + vec2i(4, 0))];
     let p5 = history[pixel_index(at + vec2i(5, 0))];
     let p6 = history[pixel_index(at + vec2i(6, 0))];
-    return mat4x4f(
-        mat4x4f(p0, p1, p2, p3) * weights,
-        mat4x4f(p1, p2, p3, p4) * weights,
-        mat4x4f(p2, p3, p4, p5) * weights,
-        mat4x4f(p3, p4, p5, p6) * weights,
+    return HistoryRow(
+        mat4x4f(
+            mat4x4f(p0, p1, p2, p3) * weights,
+            mat4x4f(p1, p2, p3, p4) * weights,
+            mat4x4f(p2, p3, p4, p5) * weights,
+            mat4x4f(p3, p4, p5, p6) * weights,
+        ),
+        mat4x4f(mix(p1, p2, f), mix(p2, p3, f), mix(p3, p4, f), mix(p4, p5, f)),
+        mat4x4f(min(p1, p2), min(p2, p3), min(p3, p4), min(p4, p5)),
+        mat4x4f(max(p1, p2), max(p2, p3), max(p3, p4), max(p4, p5)),
     );
 }
 

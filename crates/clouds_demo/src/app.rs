@@ -400,6 +400,11 @@ impl App {
             ui.checkbox(&mut self.auto, "auto").on_hover_text("as the last picture at rest asks for");
             let rate = egui::Slider::new(&mut self.rate, 2.0..=120.0).logarithmic(true).suffix(" Hz");
             panel::labelled(ui, "wanted", |ui| ui.add(rate)).on_hover_text("frames a second while anything moves");
+            ui.separator();
+            ui.toggle_value(&mut self.help, "F1 keys");
+            if ui.button("F2 view alone").on_hover_text("hides the panels").clicked() {
+                self.bare = Some(Instant::now());
+            }
         });
     }
 
@@ -547,10 +552,6 @@ impl App {
 
     fn status(&mut self, ui: &mut Ui) {
         ui.horizontal_wrapped(|ui| {
-            ui.toggle_value(&mut self.help, "F1 keys");
-            if ui.button("F2 view alone").on_hover_text("hides the panels").clicked() {
-                self.bare = Some(Instant::now());
-            }
             let flight = &self.flight;
             ui.monospace(format!("{:>3.0}° {:<2}", flight.azimuth, flight.compass()));
             ui.monospace(format!("{:>7.0} m", flight.eye.z));

@@ -68,7 +68,7 @@ def main() -> None:
                 time.sleep(5)
                 save("in_cloud", shot)
                 demo.click(187, 12)
-                demo.click(186, 129)
+                demo.click(227, 129)
                 demo.do("mousemove", 700, 400)
                 time.sleep(5)
                 save("evening", shot)

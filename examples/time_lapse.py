@@ -27,15 +27,19 @@ args = parser.parse_args()
 
 fair = nubis.Params()
 storm = {"clouds.coverage": 0.6, "clouds.precipitation": 0.7, "clouds.top": 5000.0}
-# Hours since midnight. The wind stays: `nubis.lerp` says why.
+gale = {"wind.speed": 16.0, "wind.weather_speed": 16.0, "wind.detail_speed": 21.0}
+# Hours since midnight, and how many seconds the wind blows in each: for an eighth of the time, so
+# that a time-lapse of few frames does not flicker.
+WIND = 3600 / 8
 weather = nubis.Keyframes(
     [
         (4.0, fair.with_(**{"clouds.coverage": 0.3})),
         (11.0, fair),
-        (17.0, fair.with_(**storm)),
+        (17.0, fair.with_(**storm, **gale)),
         (22.0, fair.with_(**{"clouds.coverage": 0.35})),
     ],
     easing="smooth",
+    seconds=WIND,
 )
 midnight = datetime(2026, 6, 21, tzinfo=timezone(timedelta(hours=2)))
 
@@ -46,7 +50,6 @@ for i in range(args.frames):
     hours = 24 * i / args.frames
     sun = nubis.Sun.at(args.latitude, args.longitude, midnight + timedelta(hours=hours))
     sky = weather.at(hours).replace(sun=sun)
-    # Wind blows for an eighth of the time, so that a time-lapse of few frames does not flicker.
-    frame = renderer.render(camera, sky, time=3600 * hours / 8)
+    frame = renderer.render(camera, sky, time=WIND * hours)
     exposure = min(0.7 * nubis.auto_exposure(frame), 6.0)
     nubis.save(f"out/time_lapse_{i:03}.png", frame, exposure=exposure)

@@ -174,6 +174,33 @@ def test_frames_and_a_screenshot(display, tmp_path):
 
 
 @needs_display
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["--frames", "3"],
+        ["--frames", "1000", "--scene", "sunset", "--rate", "20"],
+        ["--frames", "5", "--fly"],
+        ["--frames", "1", "--size", "500x300"],
+    ],
+    ids=" ".join,
+)
+def test_a_window_that_is_asked_for_pictures_ends(display, tmp_path, arguments):
+    """After as many as there are, where nothing moves, with its own picture."""
+    with Window(display, tmp_path, *arguments, "--screenshot", "window.png") as demo:
+        _, errors = demo.process.communicate(timeout=PATIENCE)
+        assert demo.process.returncode == 0, errors
+    assert pixels(tmp_path / "window.png").max() > 100
+
+
+@needs_display
+def test_a_window_without_room_for_a_picture_says_so(display, tmp_path):
+    arguments = "--frames", "3", "--size", "300x300", "--screenshot", "window.png"
+    with Window(display, tmp_path, *arguments) as demo:
+        _, errors = demo.process.communicate(timeout=PATIENCE)
+        assert demo.process.returncode == 1 and "--size" in errors
+
+
+@needs_display
 def test_a_screen_of_two_pixels_a_point(display, tmp_path, monkeypatch):
     monkeypatch.setenv("WINIT_X11_SCALE_FACTOR", "2")
     arguments = "--size", "640x400", "--frames", "2", "--screenshot", "window.png"
@@ -197,7 +224,7 @@ def test_a_user_flies_paints_saves_and_goes_on_in_python(display, tmp_path, monk
         second = demo.save()
         assert off(pixels(second), pixels(first)) > 0.1
         # Another time of the day.
-        demo.click(190, 129)
+        demo.click(226, 129)
         evening = demo.save()
         assert off(pixels(evening), pixels(second)) > 0.03
         lines = demo.code()
@@ -272,6 +299,9 @@ def test_bad_arguments_are_refused_by_name():
         (["--size", "12"], "--size"),
         (["--rate", "0"], "--rate"),
         (["--screenshot", "x.png"], "--frames"),
+        (["--frames", "0"], "--frames"),
+        (["--frames", "2", "--screenshot", "no/such/folder/x.png"], "--screenshot"),
+        (["--frames", "2", "--screenshot", "x.jpg"], "--screenshot"),
         (["--adapter", "no such adapter"], "no adapter matches"),
     ):
         result = subprocess.run(

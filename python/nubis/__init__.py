@@ -33,6 +33,7 @@ from nubis._weather import WeatherBlend, WeatherChange
 from nubis.params import (
     Atmosphere,
     Clouds,
+    Drift,
     HighClouds,
     Light,
     Params,
@@ -56,6 +57,7 @@ __all__ = [
     "Clouds",
     "DensityGrid",
     "DeviceError",
+    "Drift",
     "FileError",
     "ForkError",
     "HighClouds",

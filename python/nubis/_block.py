@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -112,6 +113,41 @@ class Root(Base):
                     raise _unknown(f"{block}.{name}", value, [f"{block}.{n}" for n in names])
             new[block] = old.replace(**fields)
         return self.replace(**new)
+
+    def after(self, before: Self, time: float) -> Self:
+        """Return this sky as it goes on from another: a change of wind without a jump.
+
+        At `time` all that winds carry is where `before` has it, and from then on the winds of this
+        sky carry it on. Only `drift` changes, in f64: the result may be asked for any time, and a
+        picture a month on is as exact as the first. Times before `time` are what these winds would
+        have come from: take `before` there.
+
+        Parameters
+        ----------
+        before : Params
+            The sky until then.
+        time : float
+            When the winds change, in seconds, as for `Renderer.render`.
+
+        Raises
+        ------
+        ParameterError
+            For what is no sky or no finite time.
+
+        Examples
+        --------
+        >>> breeze = nubis.Params()
+        >>> gale = breeze.with_(**{"wind.speed": 25.0}).after(breeze, 3600.0)
+        >>> skies = [breeze if time < 3600 else gale for time in range(0, 7200, 60)]
+        """
+        if type(before) is not type(self):
+            raise ParameterError(f"before = {before!r} is not allowed: it must be a nubis.Params")
+        when = _nubis.number("time", time)
+        if not math.isfinite(when):
+            raise ParameterError(f"time = {time!r} is not allowed: it must be a finite number")
+        return self.with_(
+            **{f"drift.{n}": v for n, v in _nubis.drift_after(self, before, when).items()}
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values by group and field name; arrays as nested lists.

@@ -17,6 +17,11 @@ from nubis.params import Params
 class Keyframes:
     """Skies at some times, and by `lerp` those between them.
 
+    Winds that change carry the clouds on from where they are: how far is the integral of the winds
+    that `at` has at each moment, exact to f64, so that any time may be asked for in any order. It
+    goes into `Params.drift`. A sky of `at` belongs to its time: it is for
+    ``render(..., time=seconds * time)``.
+
     Parameters
     ----------
     keys : iterable of (float, Params)
@@ -24,33 +29,42 @@ class Keyframes:
     easing : {"linear", "smooth"}
         How a sky goes to the next: evenly, or slowly away from the one and slowly up to the other,
         without a kink at the keys.
+    seconds : float
+        How many seconds of `Renderer.render` a unit of the times of the keys is: 1 for times in
+        seconds, 3600 for hours. Only skies whose winds change depend on it.
 
     Attributes
     ----------
     keys : tuple of (float, Params)
         The same, in the order of time.
     easing : str
+    seconds : float
 
     Raises
     ------
     ParameterError
-        For no keys at all, two at one time, and what is no time or sky.
+        For no keys at all, two at one time, and what is no time or sky; for winds that wander and
+        change over more than 16,384 times `wander.period` from one key to the next.
 
     Examples
     --------
-    >>> day = nubis.Keyframes([(6, clear), (15, stormy), (21, clear)], easing="smooth")
-    >>> sky = day.at(12.5)
+    >>> day = nubis.Keyframes([(6, clear), (15, stormy), (21, clear)], "smooth", seconds=3600)
+    >>> frame = renderer.render(camera, day.at(12.5), time=3600 * 12.5)
     """
 
-    __slots__ = ("easing", "keys")
+    __slots__ = ("_carried", "easing", "keys", "seconds")
 
     keys: tuple[tuple[float, Params], ...]
     easing: Literal["linear", "smooth"]
+    seconds: float
+    # How far the winds have carried things at each key; empty where all keys have the same.
+    _carried: list[list[float]]
 
     def __init__(
         self,
         keys: Iterable[tuple[float, Params]],
         easing: Literal["linear", "smooth"] = "linear",
+        seconds: float = 1.0,
     ) -> None:
         try:
             pairs = [(time, params) for time, params in keys]
@@ -63,6 +77,11 @@ class Keyframes:
         if easing not in ("linear", "smooth"):
             raise ParameterError(
                 f"easing = {easing!r} is not allowed: it must be 'linear' or 'smooth'"
+            )
+        unit = _nubis.number("seconds", seconds)
+        if not 0 < unit < math.inf:
+            raise ParameterError(
+                f"seconds = {seconds!r} is not allowed: it must be a finite number above 0"
             )
         made = []
         for index, (time, params) in enumerate(pairs):
@@ -79,6 +98,12 @@ class Keyframes:
                 )
         object.__setattr__(self, "keys", tuple(made))
         object.__setattr__(self, "easing", easing)
+        object.__setattr__(self, "seconds", unit)
+        object.__setattr__(self, "_carried", [])
+        if not all(_nubis.same_winds(made[0][1], params) for _, params in made):
+            self._carried.append(_nubis.carried(made[0][1], unit * made[0][0]))
+            for index in range(len(made) - 1):
+                self._carried.append(self._carried_at(index, made[index + 1][0]))
 
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError(f"cannot assign to {name!r}: Keyframes are frozen")
@@ -87,31 +112,57 @@ class Keyframes:
         raise AttributeError(f"cannot delete {name!r}: Keyframes are frozen")
 
     def __reduce__(self) -> tuple[type[Keyframes], tuple[object, ...]]:
-        return (Keyframes, (self.keys, self.easing))
+        return (Keyframes, (self.keys, self.easing, self.seconds))
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Keyframes):
             return NotImplemented
-        return (self.keys, self.easing) == (other.keys, other.easing)
+        return self.__reduce__() == other.__reduce__()
 
     def __hash__(self) -> int:
-        return hash((self.keys, self.easing))
+        return hash(self.__reduce__())
 
     def __repr__(self) -> str:
-        return f"Keyframes({list(self.keys)!r}, easing={self.easing!r})"
+        return f"Keyframes({list(self.keys)!r}, easing={self.easing!r}, seconds={self.seconds!r})"
 
     def at(self, time: float) -> Params:
         """Return the sky at a time: before the first key the first's, after the last the last's."""
         now = _time("time", time)
         index = bisect_right([key for key, _ in self.keys], now)
         if index in (0, len(self.keys)):
-            return self.keys[min(index, len(self.keys) - 1)][1]
+            # What follows the last key is carried on from there.
+            (key, sky) = self.keys[max(index - 1, 0)]
+            return self._drifted(sky, index - 1, key) if index else sky
         (start, before), (end, after) = self.keys[index - 1], self.keys[index]
         # Halves, so that no difference is beyond the largest float.
         share = (0.5 * now - 0.5 * start) / (0.5 * end - 0.5 * start)
         if self.easing == "smooth":
             share = share * share * (3 - 2 * share)
-        return lerp(before, after, min(max(share, 0.0), 1.0))
+        return self._drifted(lerp(before, after, min(max(share, 0.0), 1.0)), index - 1, now)
+
+    def _drifted(self, sky: Params, index: int, time: float) -> Params:
+        """The sky of a time at a key or before the next, with what has been carried until then."""
+        if not self._carried:
+            return sky
+        fields = _nubis.drift_of(sky, self.seconds * time, self._carried_at(index, time))
+        return sky.with_(**{f"drift.{name}": value for name, value in fields.items()})
+
+    def _carried_at(self, index: int, time: float) -> list[float]:
+        """How far things have been carried at a time at a key or before the next."""
+        carried = self._carried[index]
+        start, before = self.keys[index]
+        if time == start:
+            return carried
+        end, after = self.keys[index + 1]
+        span = (self.seconds * start, self.seconds * end)
+        way = _nubis.carried_between(
+            (before, after),
+            span,
+            self.easing == "smooth",
+            carried[-1] + before.drift.swings,
+            self.seconds * time,
+        )
+        return [a + b for a, b in zip(carried, way, strict=True)]
 
 
 def _time(name: str, value: object) -> float:

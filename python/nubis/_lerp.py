@@ -27,8 +27,9 @@ def lerp(a: Params, b: Params, t: float) -> Params:
     - What has nothing between switches from `a` to `b` at t = 0.5: words (models, noises), True and
       False, whole numbers (seeds, octaves, sizes), the volume. Keep it equal for a smooth sky.
 
-    Winds are how fast clouds go, and where they are is that times the time since 0 s. Over hours a
-    change of wind moves them by kilometres at once: keep winds equal in a time-lapse.
+    Winds are how fast clouds go, and where they are is that times the time since 0 s, and
+    `Params.drift`. `lerp` knows no time: after hours another share of two winds has the clouds
+    elsewhere by kilometres. Over time use `Keyframes`, which carry them on, or `Params.after`.
 
     Parameters
     ----------

@@ -243,18 +243,43 @@ def adapters() -> list[dict[str, str]]: ...
 def cache_usage() -> tuple[Path | None, int]:
     """The folder of the cache, None where it is off, and how many bytes are in it."""
 
+def carried(params: Params, time: float) -> list[float]:
+    """How far a sky has carried things from 0 s to a time, beside its drift."""
+
+def carried_between(
+    skies: tuple[Params, Params],
+    span: tuple[float, float],
+    smooth: bool,
+    swings: float,
+    time: float,
+) -> list[float]:
+    """How far things are carried from the start of the span to a time, on the way from one sky to
+    another, by a wander that is `swings` ahead.
+    """
+
 def check(type_name: str, path: str, name: str, value: object) -> Any:
     """The value in the type that a field of a block holds, or `ParameterError`."""
 
 def check_params(params: object) -> None: ...
 def check_quality(quality: Quality) -> None: ...
 def clear_cache() -> None: ...
+def drift_after(params: object, before: object, time: float) -> dict[str, Any]:
+    """The fields of the drift with which a sky goes on from another."""
+
+def drift_of(params: Params, time: float, carried: list[float]) -> dict[str, Any]:
+    """The fields of the drift of a sky that has carried things so far at a time, beside the drift
+    that it has.
+    """
+
 def number(name: str, value: object) -> float:
     """The number that is given for an argument, or `ParameterError`."""
 
 def quality(name: str) -> dict[str, Any]: ...
 def read_pixels(path: str | PathLike[str]) -> npt.NDArray[np.float32]:
     """The numbers in a PNG, HDR or EXR file, shape (H, W, 1) or (H, W, 3)."""
+
+def same_winds(a: Params, b: Params) -> bool:
+    """Whether what winds carry moves alike in two skies."""
 
 def to_srgb8(
     frame: npt.NDArray[np.float32], exposure: float, tonemap: str

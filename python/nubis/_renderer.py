@@ -280,6 +280,12 @@ class Renderer:
         quality ``"reference"`` every frame is a still, and a static shot goes on tracing paths:
         each frame has less noise.
 
+        Where winds differ from those of the shot before, the sky does not jump to where it would
+        be had they always blown: it goes on from where it is, until the next cut, and the winds
+        change half way between the two shots. A still of such a shot is elsewhere; where stills
+        and frames have to agree, and for shots in any order, say where the sky is by `Keyframes`
+        or `Params.after`, which are shown as they are.
+
         Parameters
         ----------
         shots : iterable of (Camera, Params, time in seconds[, scene_depth[, scene_color]])

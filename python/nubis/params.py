@@ -294,6 +294,51 @@ class Wander(Block):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Drift(Block):
+    """Where things are at 0 s, as the winds of now would have it. All 0, unless the winds have
+    changed on the way: `Params.after`, `Keyframes` and `Renderer.animate` set it, so that the sky
+    goes on from where it is.
+
+    Attributes
+    ----------
+    shape : tuple[float, float]
+        How far the base shapes are carried, east and north. Allowed: 2 numbers from -1000000000000
+        to 1000000000000 m.
+    detail : tuple[float, float]
+        The detail. Allowed: 2 numbers from -1000000000000 to 1000000000000 m.
+    weather : tuple[float, float]
+        The weather map. Allowed: 2 numbers from -1000000000000 to 1000000000000 m.
+    upper : tuple[float, float]
+        The upper deck, its weather with its shapes. Allowed: 2 numbers from -1000000000000 to
+        1000000000000 m.
+    upper_detail : tuple[float, float]
+        The detail of the upper deck. Allowed: 2 numbers from -1000000000000 to 1000000000000 m.
+    high : tuple[float, float]
+        The high clouds, along `high_clouds.direction` and to the left of it. Allowed: 2 numbers
+        from -1000000000000 to 1000000000000 m.
+    rise : float
+        How far the updraft has raised the noises. Allowed: a number from -1000000000000 to
+        1000000000000 m.
+    evolution : float
+        How often the largest shapes of the high clouds have been replaced
+        (`high_clouds.evolution`). Allowed: a number from -1000000000000 to 1000000000000.
+    swings : float
+        How many times `wander.period` the wander is ahead. Allowed: a number from -1000000000000 to
+        1000000000000.
+    """
+
+    shape: tuple[float, float] = (0.0, 0.0)
+    detail: tuple[float, float] = (0.0, 0.0)
+    weather: tuple[float, float] = (0.0, 0.0)
+    upper: tuple[float, float] = (0.0, 0.0)
+    upper_detail: tuple[float, float] = (0.0, 0.0)
+    high: tuple[float, float] = (0.0, 0.0)
+    rise: float = 0.0
+    evolution: float = 0.0
+    swings: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class HighClouds(Block):
     """The thin high clouds, a layer without thickness on its own sphere (nubis2015; animated as in
     gems2001).
@@ -597,6 +642,10 @@ class Params(Root):
     wander : Wander
         Winds and cover that wander over hours (gems2001): four slow turns of unlike periods, in
         closed form, so that any time can be asked for.
+    drift : Drift
+        Where things are at 0 s, as the winds of now would have it. All 0, unless the winds have
+        changed on the way: `Params.after`, `Keyframes` and `Renderer.animate` set it, so that the
+        sky goes on from where it is.
     high_clouds : HighClouds
         The thin high clouds, a layer without thickness on its own sphere (nubis2015; animated as in
         gems2001).
@@ -618,6 +667,7 @@ class Params(Root):
     weather: Weather = field(default_factory=Weather)
     wind: Wind = field(default_factory=Wind)
     wander: Wander = field(default_factory=Wander)
+    drift: Drift = field(default_factory=Drift)
     high_clouds: HighClouds = field(default_factory=HighClouds)
     light: Light = field(default_factory=Light)
     atmosphere: Atmosphere = field(default_factory=Atmosphere)

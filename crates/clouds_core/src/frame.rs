@@ -537,7 +537,7 @@ impl Frame {
 
     fn set_wind(&mut self, eye: DVec3, params: &Params, time: f64) {
         let (clouds, wind, high) = (&params.clouds, &params.wind, &params.high_clouds);
-        let carried = Carried::new(params, 0.0, time);
+        let carried = Carried::at(params, time);
         let volume = |at: DVec2, scale: f32| [wrap(at.x, scale), wrap(at.y, scale), wrap(-carried.rise, scale)];
         let plane = |at: DVec2, scale: f32| [wrap(at.x, scale), wrap(at.y, scale)];
         self.wind_direction = compass(f64::from(wind.direction)).as_vec2().to_array();
@@ -570,8 +570,7 @@ impl Frame {
 
         let along = compass(f64::from(high.direction));
         let across = DVec2::new(-along.y, along.x);
-        let at = eye.truncate() - carried.high;
-        let at = DVec2::new(at.dot(along), at.dot(across));
+        let at = DVec2::new(eye.truncate().dot(along), eye.truncate().dot(across)) - carried.high;
         self.high_origin = plane(at, high.scale);
         self.high_broad_origin = plane(at, HIGH_BROAD * high.scale);
         self.high_direction = along.as_vec2().to_array();
@@ -580,7 +579,7 @@ impl Frame {
         let step = 1.0 / (256.0 * f64::from(high.evolution) * f64::from(1u32 << (high.octaves - 1)));
         let time = if step.is_finite() { (time / step).round() * step } else { time };
         for octave in 0..8 {
-            let updates = time * f64::from(high.evolution) * f64::from(1u32 << octave);
+            let updates = (time * f64::from(high.evolution) + params.drift.evolution) * f64::from(1u32 << octave);
             // Update numbers come round after 65,536, exact in f32 (passes/high_clouds.wgsl).
             let (number, age) = (updates.floor().rem_euclid(65536.0) as f32, (updates - updates.floor()) as f32);
             let (numbers, ages) = if octave < 4 {

@@ -18,10 +18,10 @@ const WEATHER_MIX: &str = "Other weathers and their shares of the weather map: e
 
 fn python_type(field: &Field) -> String {
     match field.ty {
-        Type::F32 => "float".into(),
+        Type::F32 | Type::Exact(1) => "float".into(),
         Type::U32 => "int".into(),
         Type::Bool => "bool".into(),
-        Type::Vector(n) => format!("tuple[{}]", vec!["float"; n].join(", ")),
+        Type::Vector(n) | Type::Exact(n) => format!("tuple[{}]", vec!["float"; n].join(", ")),
         Type::Choice(names) => {
             format!("Literal[{}]", names.iter().map(|name| format!("{name:?}")).collect::<Vec<_>>().join(", "))
         }

@@ -21,7 +21,7 @@ pub mod scene_depth;
 pub mod schema;
 pub mod shader;
 pub mod volume;
-mod wind;
+pub mod wind;
 
 pub use camera::Camera;
 pub use error::{Error, Result};

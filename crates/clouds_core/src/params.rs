@@ -238,6 +238,29 @@ params! {
         seed: u32 = 11, in 0..=4294967295.0 "";
     }
 
+    /// Where things are at 0 s, as the winds of now would have it. All 0, unless the winds have changed on the way:
+    /// `Params.after`, `Keyframes` and `Renderer.animate` set it, so that the sky goes on from where it is.
+    Drift {
+        /// How far the base shapes are carried, east and north.
+        shape: [f64; 2] = [0.0, 0.0], in -1000000000000.0..=1000000000000.0 "m";
+        /// The detail.
+        detail: [f64; 2] = [0.0, 0.0], in -1000000000000.0..=1000000000000.0 "m";
+        /// The weather map.
+        weather: [f64; 2] = [0.0, 0.0], in -1000000000000.0..=1000000000000.0 "m";
+        /// The upper deck, its weather with its shapes.
+        upper: [f64; 2] = [0.0, 0.0], in -1000000000000.0..=1000000000000.0 "m";
+        /// The detail of the upper deck.
+        upper_detail: [f64; 2] = [0.0, 0.0], in -1000000000000.0..=1000000000000.0 "m";
+        /// The high clouds, along `high_clouds.direction` and to the left of it.
+        high: [f64; 2] = [0.0, 0.0], in -1000000000000.0..=1000000000000.0 "m";
+        /// How far the updraft has raised the noises.
+        rise: f64 = 0.0, in -1000000000000.0..=1000000000000.0 "m";
+        /// How often the largest shapes of the high clouds have been replaced (`high_clouds.evolution`).
+        evolution: f64 = 0.0, in -1000000000000.0..=1000000000000.0 "";
+        /// How many times `wander.period` the wander is ahead.
+        swings: f64 = 0.0, in -1000000000000.0..=1000000000000.0 "";
+    }
+
     /// The thin high clouds, a layer without thickness on its own sphere (nubis2015; animated as in gems2001).
     HighClouds {
         /// How much of the sky they cover: 0 is clear, 1 overcast.
@@ -406,6 +429,7 @@ pub struct Params {
     pub weather: Weather,
     pub wind: Wind,
     pub wander: Wander,
+    pub drift: Drift,
     pub high_clouds: HighClouds,
     pub light: Light,
     pub atmosphere: Atmosphere,
@@ -445,7 +469,7 @@ impl BroadShares {
 
 impl Params {
     /// The blocks with their names.
-    pub fn blocks(&self) -> [(&'static str, &dyn Block); 9] {
+    pub fn blocks(&self) -> [(&'static str, &dyn Block); 10] {
         [
             ("sun", &self.sun),
             ("clouds", &self.clouds),
@@ -453,6 +477,7 @@ impl Params {
             ("weather", &self.weather),
             ("wind", &self.wind),
             ("wander", &self.wander),
+            ("drift", &self.drift),
             ("high_clouds", &self.high_clouds),
             ("light", &self.light),
             ("atmosphere", &self.atmosphere),
@@ -460,7 +485,7 @@ impl Params {
     }
 
     /// The same, to set them.
-    pub fn blocks_mut(&mut self) -> [(&'static str, &mut dyn Block); 9] {
+    pub fn blocks_mut(&mut self) -> [(&'static str, &mut dyn Block); 10] {
         [
             ("sun", &mut self.sun),
             ("clouds", &mut self.clouds),
@@ -468,6 +493,7 @@ impl Params {
             ("weather", &mut self.weather),
             ("wind", &mut self.wind),
             ("wander", &mut self.wander),
+            ("drift", &mut self.drift),
             ("high_clouds", &mut self.high_clouds),
             ("light", &mut self.light),
             ("atmosphere", &mut self.atmosphere),
@@ -765,6 +791,7 @@ pub fn block(type_name: &str) -> Option<Box<dyn Block>> {
         weather,
         wind,
         wander,
+        drift,
         high_clouds,
         light,
         atmosphere,
@@ -772,13 +799,14 @@ pub fn block(type_name: &str) -> Option<Box<dyn Block>> {
         volume: _,
     } = Params::default();
     let quality = Quality::default();
-    let blocks: [Box<dyn Block>; 10] = [
+    let blocks: [Box<dyn Block>; 11] = [
         Box::new(sun),
         Box::new(clouds),
         Box::new(upper_clouds),
         Box::new(weather),
         Box::new(wind),
         Box::new(wander),
+        Box::new(drift),
         Box::new(high_clouds),
         Box::new(light),
         Box::new(atmosphere),
@@ -793,8 +821,11 @@ pub fn uniform_layout() -> (Vec<(&'static str, &'static str, usize)>, usize) {
     let mut offset = 0;
     let mut blocks = Vec::new();
     for (name, block) in params.blocks() {
-        blocks.push((name, block.type_name(), offset));
-        offset += schema::size(block.fields());
+        let size = schema::size(block.fields());
+        if size > 0 {
+            blocks.push((name, block.type_name(), offset));
+        }
+        offset += size;
     }
     (blocks, offset)
 }

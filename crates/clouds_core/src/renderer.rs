@@ -38,7 +38,7 @@ use crate::passes::weather::Weather;
 use crate::passes::{Bindings, Context, Scene, Uniforms, composite, march, path, points, reference, refine, reproject};
 use crate::scene_depth::{SceneDepth, SceneTextures};
 use crate::shader::Linked;
-use crate::wind::Carried;
+use crate::wind::{Carried, Going};
 
 /// What [`Renderer::history_length`] says of a pixel that has had a ray of its own: frames in which every pixel is marched once.
 pub const ROUND: u32 = reproject::round(false);
@@ -51,6 +51,7 @@ pub struct Renderer {
     world: World,
     still: Option<Still>,
     animation: Option<Animation>,
+    going: Going,
     refining: Option<Refining>,
     march_pace: Pace,
     reproject_pace: Pace,
@@ -200,6 +201,7 @@ impl Renderer {
             world: World::new(&gpu),
             still: None,
             animation: None,
+            going: Going::default(),
             refining: None,
             march_pace: pace,
             reproject_pace: pace,
@@ -432,6 +434,8 @@ impl Renderer {
         screen: Option<&Screen>,
         interrupt: Interrupt<'_>,
     ) -> Result<Vec<f32>> {
+        let last = self.animation.as_ref().and_then(|animation| animation.last.as_ref());
+        let params = &self.going.on(params, time, last.is_some_and(|last| last.is_cut(camera, params, time)));
         if Method::new(params, &self.quality) != Method::March {
             let image = self.refine(camera, params, time, background, scene_depth, interrupt)?;
             screen.map_or(Ok(()), |screen| screen.write(&self.gpu, &image))?;
@@ -491,7 +495,11 @@ impl Renderer {
             animation.scene_before.upload(gpu, &before, 0..pixels as usize);
         }
         if let Some(last) = &last {
-            frame.set_previous(&last.frame, camera.eye - last.camera.eye, &Carried::new(params, last.time, time));
+            frame.set_previous(
+                &last.frame,
+                camera.eye - last.camera.eye,
+                &Carried::between((&last.params, last.time), (params, time)),
+            );
             frame.moving = u32::from(last.camera != *camera || frame.cloud_motion != [0.0; 3] || had != has);
         }
         let variant = Variant::of_frame(params, quality, &frame);
@@ -624,6 +632,7 @@ impl Renderer {
     /// Forgets the frame before: the next one of [`Renderer::animate`] is a still.
     pub fn cut(&mut self) {
         self.refining = None;
+        self.going = Going::default();
         if let Some(animation) = &mut self.animation {
             animation.last = None;
         }

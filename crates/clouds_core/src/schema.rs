@@ -17,6 +17,8 @@ pub enum Type {
     Bool,
     /// Two, three or four numbers.
     Vector(usize),
+    /// One or two numbers in f64, too exact for a uniform: the GPU knows what follows from them, by `frame`.
+    Exact(usize),
     /// One of a few words; its index is a `u32` in WGSL.
     Choice(&'static [&'static str]),
     /// Nothing, or an image of so many channels: it reaches the GPU as a texture and not in the uniform.
@@ -29,7 +31,7 @@ impl Type {
         match self {
             Self::F32 | Self::U32 | Self::Bool | Self::Choice(_) => 1,
             Self::Vector(n) => n,
-            Self::Map(_) => 0,
+            Self::Exact(_) | Self::Map(_) => 0,
         }
     }
 
@@ -48,7 +50,7 @@ impl Type {
             Self::F32 => "f32".into(),
             Self::Vector(n) => format!("vec{n}f"),
             Self::U32 | Self::Bool | Self::Choice(_) => "u32".into(),
-            Self::Map(_) => unreachable!("maps are textures"),
+            Self::Exact(_) | Self::Map(_) => unreachable!("is in no uniform"),
         }
     }
 }
@@ -131,10 +133,10 @@ impl Field {
         let (min, max) = self.range;
         let unit = if self.unit.is_empty() { String::new() } else { format!(" {}", self.unit) };
         match self.ty {
-            Type::F32 => format!("a number from {min} to {max}{unit}"),
+            Type::F32 | Type::Exact(1) => format!("a number from {min} to {max}{unit}"),
             Type::U32 => format!("a whole number from {min} to {max}{unit}"),
             Type::Bool => "True or False".into(),
-            Type::Vector(n) => format!("{n} numbers from {min} to {max}{unit}"),
+            Type::Vector(n) | Type::Exact(n) => format!("{n} numbers from {min} to {max}{unit}"),
             Type::Choice(names) => format!("one of {names:?}").replace(['[', ']'], ""),
             Type::Map(channels) => {
                 let shape = if channels == 1 { "(H, W)".into() } else { format!("(H, W, {channels})") };
@@ -154,10 +156,10 @@ impl Field {
             _ => None,
         };
         let checked = match (self.ty, value) {
-            (Type::F32, v) => number(v).filter(|v| in_range(*v)).map(Value::Float),
+            (Type::F32 | Type::Exact(1), v) => number(v).filter(|v| in_range(*v)).map(Value::Float),
             (Type::U32, Value::Int(v)) => in_range(*v as f64).then_some(Value::Int(*v)),
             (Type::Bool, Value::Bool(v)) => Some(Value::Bool(*v)),
-            (Type::Vector(n), Value::Vector(v)) => {
+            (Type::Vector(n) | Type::Exact(n), Value::Vector(v)) => {
                 (v.len() == n && v.iter().all(|v| in_range(*v))).then(|| value.clone())
             }
             (Type::Choice(names), Value::Text(v)) => names.contains(&v.as_str()).then(|| value.clone()),
@@ -207,6 +209,35 @@ impl Typed for f32 {
     fn write(&self, out: &mut [u32]) {
         out[0] = self.to_bits();
     }
+}
+
+impl Typed for f64 {
+    const TYPE: Type = Type::Exact(1);
+    fn from_value(value: &Value) -> Option<Self> {
+        match value {
+            Value::Float(v) => Some(*v),
+            Value::Int(v) => Some(*v as f64),
+            _ => None,
+        }
+    }
+    fn to_value(&self) -> Value {
+        Value::Float(*self)
+    }
+    fn write(&self, _out: &mut [u32]) {}
+}
+
+impl Typed for [f64; 2] {
+    const TYPE: Type = Type::Exact(2);
+    fn from_value(value: &Value) -> Option<Self> {
+        match value {
+            Value::Vector(v) => v.as_slice().try_into().ok(),
+            _ => None,
+        }
+    }
+    fn to_value(&self) -> Value {
+        Value::Vector(self.to_vec())
+    }
+    fn write(&self, _out: &mut [u32]) {}
 }
 
 impl Typed for u32 {
@@ -352,8 +383,11 @@ pub fn wgsl_name(name: &str) -> &str {
     if name == "type" { "type_" } else { name }
 }
 
-/// The WGSL struct of a block.
+/// The WGSL struct of a block, nothing where it would be empty.
 pub fn wgsl_struct(block: &dyn Block) -> String {
+    if size(block.fields()) == 0 {
+        return String::new();
+    }
     let mut code = format!("struct {} {{\n", block.type_name());
     for field in block.fields().iter().filter(|field| field.ty.words() > 0) {
         let unit = if field.unit.is_empty() { String::new() } else { format!(" [{}]", field.unit) };

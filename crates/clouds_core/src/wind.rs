@@ -1,12 +1,15 @@
-//! Where the winds have carried what they carry, and how much cover there is: closed forms in time, in f64. No time is
-//! stepped through, so a picture a month on is as exact as the first, and frames may come in any order.
+//! Where the winds have carried what they carry, and how much cover there is: closed forms in time, in f64. No frame is
+//! stepped through, so a picture a month on is as exact as the first, and frames may come in any order. Where winds change,
+//! `drift` says how far the winds of before have carried things ([`Params::after`], [`Between`]).
 
 use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3};
 
+use crate::error::{Error, Result};
 use crate::frame::compass;
-use crate::params::{Params, Wander};
+use crate::params::{Drift, HighClouds, Params, UpperClouds, Wander, Wind};
+use crate::schema::Block as _;
 
 /// How many slow turns a wander is the mean of.
 const TURNS: i32 = 4;
@@ -25,22 +28,24 @@ enum Of {
 }
 
 impl Wander {
-    /// Angular velocity in 1/s, every second one the other way round, and phase of each turn.
-    fn turns(&self, of: Of) -> impl Iterator<Item = (f64, f64)> {
-        let (period, seed) = (f64::from(self.period), self.seed);
+    /// Angular velocity in 1/s, every second one the other way round, and phase at 0 s of each turn of a wander that is so
+    /// many periods ahead.
+    fn turns(&self, of: Of, swings: f64) -> impl Iterator<Item = (f64, f64)> {
+        let (mean, seed) = (f64::from(self.period), self.seed);
         (0..TURNS).map(move |turn| {
-            let period = period * RATIO.powf(f64::from(turn) - 0.5 * f64::from(TURNS - 1));
+            let period = mean * RATIO.powf(f64::from(turn) - 0.5 * f64::from(TURNS - 1));
             let sign = if turn % 2 == 0 { 1.0 } else { -1.0 };
             let random = pcg3d([seed, turn as u32, of as u32])[0];
-            (sign * TAU / period, f64::from(random) / 2f64.powi(32) * TAU)
+            let omega = sign * TAU / period;
+            (omega, f64::from(random) / 2f64.powi(32) * TAU + omega * (swings * mean))
         })
     }
 
     /// For how many seconds a wind has blown, along its mean and across it to the left, in `time` seconds. Its velocity
     /// is the mean one times 1 + wind x mean of exp(i (omega t + phase)), in complex numbers, which has this integral.
-    fn way(&self, time: f64) -> DVec2 {
+    fn way(&self, swings: f64, time: f64) -> DVec2 {
         let gusts: DVec2 = self
-            .turns(Of::Wind)
+            .turns(Of::Wind, swings)
             .map(|(omega, phase)| {
                 let (from, to) = (phase.sin_cos(), (omega * time + phase).sin_cos());
                 DVec2::new(to.0 - from.0, from.1 - to.1) / omega
@@ -50,8 +55,8 @@ impl Wander {
     }
 
     /// The cover at a time, for a mean of `coverage`.
-    fn cover(&self, coverage: f32, time: f64) -> f32 {
-        let sum: f64 = self.turns(Of::Cover).map(|(omega, phase)| (omega * time + phase).sin()).sum();
+    fn cover(&self, coverage: f32, swings: f64, time: f64) -> f32 {
+        let sum: f64 = self.turns(Of::Cover, swings).map(|(omega, phase)| (omega * time + phase).sin()).sum();
         let swing = (sum / f64::from(TURNS) * COVER_STEPS).round() / COVER_STEPS;
         (coverage + self.coverage * swing as f32).clamp(0.0, 1.0)
     }
@@ -61,50 +66,315 @@ impl Params {
     /// The sky at a time: what wanders has its value of then, and all that reads it need not know.
     pub fn at(&self, time: f64) -> Self {
         let mut now = self.clone();
-        now.clouds.coverage = self.wander.cover(self.clouds.coverage, time);
+        now.clouds.coverage = self.wander.cover(self.clouds.coverage, self.drift.swings, time);
         now
+    }
+
+    /// The drift with which this sky goes on from another: at `time` all that winds carry is where `before` has it.
+    pub fn after(&self, before: &Self, time: f64) -> Drift {
+        if self.has_winds_of(before) {
+            // To the bit, without a sum and a difference.
+            return before.drift.clone();
+        }
+        Carried::at(before, time).drift_of(self, time)
+    }
+
+    /// Whether what winds carry moves as in another sky.
+    pub fn has_winds_of(&self, other: &Self) -> bool {
+        fn winds(params: &Params) -> (&Wind, &Wander, [f32; 5]) {
+            let UpperClouds { direction, speed, .. } = params.upper_clouds;
+            let HighClouds { direction: high_direction, speed: high_speed, evolution, .. } = params.high_clouds;
+            (&params.wind, &params.wander, [direction, speed, high_direction, high_speed, evolution])
+        }
+        winds(self) == winds(other)
     }
 }
 
-/// How far each wind has carried what it carries from one time to another, m.
-pub(crate) struct Carried {
+/// How far each wind has carried what it carries from one time to another, m; or how fast it does, m/s.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Carried {
+    /// The base shapes, east and north, as the next four.
     pub shape: DVec2,
+    /// The detail.
     pub detail: DVec2,
+    /// The weather map.
     pub weather: DVec2,
     /// The upper deck, its weather with its shapes.
     pub upper: DVec2,
     /// Its detail, which is as much faster as that of the deck below.
     pub upper_detail: DVec2,
+    /// The high clouds, along their direction and to the left of it: the layer turns with its wind, about the origin of the
+    /// world. About where the origin has been carried, a turn of a degree would move it by kilometres.
     pub high: DVec2,
     /// Upward, shapes and detail.
     pub rise: f64,
+    /// How often the largest shapes of the high clouds have been replaced.
+    pub evolution: f64,
+    /// How many of its periods the wander has gone.
+    pub swings: f64,
 }
 
+/// Numbers of [`Carried`] in a row.
+pub const NUMBERS: usize = 15;
+
 impl Carried {
+    /// By one sky's winds.
     pub fn new(params: &Params, from: f64, to: f64) -> Self {
         let (wind, upper, high) = (&params.wind, &params.upper_clouds, &params.high_clouds);
+        let (wander, swings) = (&params.wander, params.drift.swings);
         // Difference by difference: the way to either time may be too long for f64 where the way between is not.
-        let seconds = DVec2::new(to - from, 0.0) + (params.wander.way(to) - params.wander.way(from));
-        let by = |direction: f32, speed: f32| {
-            // Of a wind that does not wander exactly its speed times the time.
-            let mean = compass(f64::from(direction)) * f64::from(speed);
-            DVec2::new(mean.x * seconds.x - mean.y * seconds.y, mean.y * seconds.x + mean.x * seconds.y)
-        };
+        let seconds = DVec2::new(to - from, 0.0) + (wander.way(swings, to) - wander.way(swings, from));
+        // Of a wind that does not wander exactly its speed times the time.
+        let by = |direction: f32, speed: f32| turned(compass(f64::from(direction)) * f64::from(speed), seconds);
         Self {
             shape: by(wind.direction, wind.speed),
             detail: by(wind.detail_direction, wind.detail_speed),
             weather: by(wind.weather_direction, wind.weather_speed),
             upper: by(upper.direction, upper.speed),
             upper_detail: by(upper.direction, upper.speed + wind.detail_speed - wind.speed),
-            high: by(high.direction, high.speed),
+            high: f64::from(high.speed) * seconds,
             rise: f64::from(wind.updraft) * (to - from),
+            evolution: f64::from(high.evolution) * (to - from),
+            swings: (to - from) / f64::from(wander.period),
         }
+    }
+
+    /// To a time, and by what has been before.
+    pub fn at(params: &Params, time: f64) -> Self {
+        Self::from(&params.drift).plus(&Self::new(params, 0.0, time), 1.0)
+    }
+
+    /// From one sky at a time to another at another.
+    pub(crate) fn between((before, from): (&Params, f64), (params, to): (&Params, f64)) -> Self {
+        if params.has_winds_of(before) && params.drift == before.drift {
+            return Self::new(params, from, to);
+        }
+        Self::at(params, to).plus(&Self::at(before, from), -1.0)
+    }
+
+    /// The drift of a sky that has carried things so far at a time.
+    pub fn drift_of(&self, params: &Params, time: f64) -> Drift {
+        let swings = self.swings - time / f64::from(params.wander.period);
+        // The gusts are those of where the wander is.
+        let ahead = Params { drift: Drift { swings, ..Drift::default() }, ..params.clone() };
+        Drift { swings, ..Drift::from(&self.plus(&Self::new(&ahead, 0.0, time), -1.0)) }
+    }
+
+    /// The sum with so many times another.
+    #[must_use]
+    pub fn plus(&self, other: &Self, times: f64) -> Self {
+        let (mut sum, other) = (self.numbers(), other.numbers());
+        sum.iter_mut().zip(other).for_each(|(a, b)| *a += times * b);
+        Self::from(sum)
+    }
+
+    /// All numbers in a row.
+    pub fn numbers(&self) -> [f64; NUMBERS] {
+        let Self { shape, detail, weather, upper, upper_detail, high, rise, evolution, swings } = *self;
+        let [a, b, c, d, e, f] = [shape, detail, weather, upper, upper_detail, high].map(|v| v.to_array());
+        let [[a, x], [b, y], [c, z], [d, u], [e, v], [f, w]] = [a, b, c, d, e, f];
+        [a, x, b, y, c, z, d, u, e, v, f, w, rise, evolution, swings]
+    }
+
+    /// In gusts, as complex numbers.
+    fn blown(mut self, gust: DVec2) -> Self {
+        let Self { shape, detail, weather, upper, upper_detail, high, .. } = &mut self;
+        for wind in [shape, detail, weather, upper, upper_detail, high] {
+            *wind = turned(*wind, gust);
+        }
+        self
     }
 
     /// How far the clouds have drifted. What the eye follows is the silhouette: it drifts with the weather, and its
     /// billows with the base shape.
-    pub fn drift(&self) -> DVec3 {
+    pub(crate) fn drift(&self) -> DVec3 {
         ((self.weather + self.shape) * 0.5).extend(0.5 * self.rise)
+    }
+}
+
+impl From<[f64; NUMBERS]> for Carried {
+    fn from(numbers: [f64; NUMBERS]) -> Self {
+        let pair = |index: usize| DVec2::new(numbers[2 * index], numbers[2 * index + 1]);
+        let [.., rise, evolution, swings] = numbers;
+        let [shape, detail, weather, upper, upper_detail, high] = [0, 1, 2, 3, 4, 5].map(pair);
+        Self { shape, detail, weather, upper, upper_detail, high, rise, evolution, swings }
+    }
+}
+
+impl From<&Drift> for Carried {
+    fn from(drift: &Drift) -> Self {
+        let Drift { shape, detail, weather, upper, upper_detail, high, rise, evolution, swings } = *drift;
+        let [shape, detail, weather] = [shape, detail, weather].map(DVec2::from);
+        let [upper, upper_detail, high] = [upper, upper_detail, high].map(DVec2::from);
+        Self { shape, detail, weather, upper, upper_detail, high, rise, evolution, swings }
+    }
+}
+
+impl From<&Carried> for Drift {
+    fn from(carried: &Carried) -> Self {
+        let Carried { shape, detail, weather, upper, upper_detail, high, rise, evolution, swings } = *carried;
+        let [shape, detail, weather] = [shape, detail, weather].map(|v| v.to_array());
+        let [upper, upper_detail, high] = [upper, upper_detail, high].map(|v| v.to_array());
+        Self { shape, detail, weather, upper, upper_detail, high, rise, evolution, swings }
+    }
+}
+
+/// The product of two complex numbers.
+fn turned(a: DVec2, b: DVec2) -> DVec2 {
+    DVec2::new(a.x * b.x - a.y * b.y, a.y * b.x + a.x * b.y)
+}
+
+/// The winds on the way from one sky to another, as `nubis.lerp` has them: speeds in a straight line, directions on the
+/// shorter arc, the wander by its period of each moment.
+pub struct Between<'a> {
+    /// The sky at the start and that at the end.
+    pub skies: [&'a Params; 2],
+    /// Start and end, s.
+    pub span: [f64; 2],
+    /// Whether the way is slow at both ends.
+    pub smooth: bool,
+}
+
+/// Nodes and weights of Gauss and Legendre's quadrature by eight points on -1 to 1 (the other half of them mirrored). Exact
+/// for polynomials to the 15th degree; of the pieces of [`Between::piece`] it misses 1e-15.
+const GAUSS: [(f64, f64); 4] = [
+    (0.183_434_642_495_649_8, 0.362_683_783_378_362),
+    (0.525_532_409_916_329, 0.313_706_645_877_887_3),
+    (0.796_666_477_413_626_7, 0.222_381_034_453_374_5),
+    (0.960_289_856_497_536_3, 0.101_228_536_290_376_3),
+];
+/// Most periods of a wind that wanders from one sky to another: a tenth of a second to integrate.
+const MOST_PERIODS: f64 = 16384.0;
+
+/// Nodes and weights between two numbers.
+fn gauss(from: f64, to: f64) -> impl Iterator<Item = (f64, f64)> {
+    let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
+    GAUSS.into_iter().flat_map(move |(x, w)| [(middle - half * x, half * w), (middle + half * x, half * w)])
+}
+
+impl Between<'_> {
+    /// The integral of all velocities and rates from the start to a time of the span, for a wander that is `swings` ahead at
+    /// the start.
+    pub fn carried(&self, swings: f64, time: f64) -> Result<Carried> {
+        let [start, end] = self.span;
+        let gusty = self.skies.iter().any(|sky| sky.wander.wind > 0.0);
+        let periods =
+            (end - start) / self.skies.map(|sky| f64::from(sky.wander.period)).into_iter().fold(f64::MAX, f64::min);
+        if gusty && periods > MOST_PERIODS {
+            let allowed = format!("at most {MOST_PERIODS} times wander.period where winds change and wander");
+            return Err(Error::parameter("keys time between two", end - start, allowed));
+        }
+        let turns = self.skies.map(|sky| {
+            let wander = Wander { period: 1.0, ..sky.wander.clone() };
+            wander.turns(Of::Wind, 0.0).collect::<Vec<_>>()
+        });
+        let seconds = end - start;
+        let last = ((time - start) / seconds).clamp(0.0, 1.0);
+        let mut sum = Carried { swings, ..Carried::default() };
+        let mut at = 0.0;
+        while at < last {
+            let next = self.piece(at, gusty).min(last);
+            let before = sum.swings;
+            for (u, weight) in gauss(at, next) {
+                let share = self.share(u);
+                let mut rates = self.rates(share);
+                if gusty {
+                    let gone: f64 = gauss(at, u).map(|(v, weight)| weight * self.rates(self.share(v)).swings).sum();
+                    let swings = before + seconds * gone;
+                    let turn = |&(omega, phase): &(f64, f64)| DVec2::from_angle((omega * swings + phase) % TAU);
+                    let gust = turns[usize::from(share >= 0.5)].iter().map(turn).sum::<DVec2>() / f64::from(TURNS);
+                    let [a, b] = self.skies.map(|sky| f64::from(sky.wander.wind));
+                    rates = rates.blown(DVec2::X + (a + share * (b - a)) * gust);
+                }
+                sum = sum.plus(&rates, seconds * weight);
+            }
+            at = next;
+        }
+        sum.swings -= swings;
+        Ok(sum)
+    }
+
+    /// Where a piece ends that begins at a share of the time: a quarter of the way, a quarter of the wander's period (its
+    /// fastest turn then goes 140 degrees), and so short that the period changes by a quarter. None goes over the middle, where
+    /// what has nothing between switches.
+    fn piece(&self, at: f64, gusty: bool) -> f64 {
+        let [from, to] = self.skies.map(|sky| f64::from(sky.wander.period));
+        let period = from + self.share(at) * (to - from);
+        let seconds = if gusty { self.span[1] - self.span[0] } else { 0.0 };
+        // A smooth way is up to half as steep again as a straight one.
+        let length = [0.25 * period / seconds, period / (6.0 * (to - from).abs())].into_iter().fold(0.25, f64::min);
+        let next = at + length;
+        if at < 0.5 { next.min(0.5) } else { next }
+    }
+
+    /// How much of the second sky there is at a share of the time.
+    fn share(&self, u: f64) -> f64 {
+        if self.smooth { u * u * (3.0 - 2.0 * u) } else { u }
+    }
+
+    /// Velocities, and what else goes by a second, where there is so much of the second sky; without gusts.
+    fn rates(&self, share: f64) -> Carried {
+        let line = |of: &dyn Fn(&Params) -> f32| {
+            let [a, b] = self.skies.map(|sky| f64::from(of(sky)));
+            a + share * (b - a)
+        };
+        let toward = |of: &dyn Fn(&Params) -> f32| {
+            let [a, b] = self.skies.map(|sky| f64::from(of(sky)));
+            compass(a + share * (180.0 - (180.0 - (b - a)).rem_euclid(360.0)))
+        };
+        let (speed, detail_speed) = (line(&|sky| sky.wind.speed), line(&|sky| sky.wind.detail_speed));
+        let (upper, upper_speed) = (toward(&|sky| sky.upper_clouds.direction), line(&|sky| sky.upper_clouds.speed));
+        Carried {
+            shape: speed * toward(&|sky| sky.wind.direction),
+            detail: detail_speed * toward(&|sky| sky.wind.detail_direction),
+            weather: line(&|sky| sky.wind.weather_speed) * toward(&|sky| sky.wind.weather_direction),
+            upper: upper_speed * upper,
+            upper_detail: (upper_speed + detail_speed - speed) * upper,
+            high: DVec2::new(line(&|sky| sky.high_clouds.speed), 0.0),
+            rise: line(&|sky| sky.wind.updraft),
+            evolution: line(&|sky| sky.high_clouds.evolution),
+            swings: 1.0 / line(&|sky| sky.wander.period),
+        }
+    }
+}
+
+/// What has carried the sky of an animation whose winds change from shot to shot.
+#[derive(Default)]
+pub(crate) struct Going {
+    /// The sky that was asked for last, its time, and what it lacked.
+    last: Option<(Params, f64, Carried)>,
+}
+
+/// Longest time between two shots in which a sky goes on, s; as for the rest of the history.
+const LONGEST_SHOT: f64 = 300.0;
+
+impl Going {
+    /// The sky that a shot shows: where its winds are not those of the shot before, it goes on from where it is. The winds change
+    /// half way between the two, which is what the integral of an even change is. Shots that say their drift themselves
+    /// (`Keyframes`, `Params::after`) need nothing; nor does what comes after a cut.
+    pub fn on(&mut self, params: &Params, time: f64, cut: bool) -> Params {
+        let last = self.last.take().filter(|(_, then, _)| !cut && (time - then).abs() <= LONGEST_SHOT);
+        let mut lacked = last.as_ref().map_or_else(Carried::default, |(.., lacked)| *lacked);
+        let with = |params: &Params, lacked: &Carried| {
+            let drift = Drift::from(&Carried::from(&params.drift).plus(lacked, 1.0));
+            Params { drift, ..params.clone() }
+        };
+        if let Some((before, then, _)) = &last
+            && before.drift == params.drift
+            && !params.has_winds_of(before)
+        {
+            let drift = params.after(&with(before, &lacked), 0.5 * (time + then));
+            lacked = Carried::from(&drift).plus(&Carried::from(&params.drift), -1.0);
+        }
+        let mut now = with(params, &lacked);
+        let allowed =
+            |(index, field): (usize, &crate::schema::Field)| field.check("drift", &now.drift.get(index)).is_ok();
+        if !Drift::FIELDS.iter().enumerate().all(allowed) {
+            // After a time that is beyond all sense.
+            (now, lacked) = (params.clone(), Carried::default());
+        }
+        self.last = Some((params.clone(), time, lacked));
+        now
     }
 }
 
@@ -148,7 +418,8 @@ mod tests {
             (wind.direction, wind.speed),
             (wind.detail_direction, wind.detail_speed),
             (wind.weather_direction, wind.weather_speed),
-            (high.direction, high.speed),
+            // In the frame of its own direction.
+            (90.0, high.speed),
         ]
         .map(|(direction, speed)| compass(f64::from(direction)) * f64::from(speed))
     }
@@ -156,7 +427,7 @@ mod tests {
     /// The velocity in place of its integral: the mean of turning vectors, as complex numbers.
     fn gust(wander: &Wander, time: f64) -> DVec2 {
         let turn = |(omega, phase): (f64, f64)| DVec2::from_angle(omega * time + phase);
-        wander.turns(Of::Wind).map(turn).sum::<DVec2>() / f64::from(TURNS)
+        wander.turns(Of::Wind, 0.0).map(turn).sum::<DVec2>() / f64::from(TURNS)
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result};
@@ -17,8 +17,9 @@ use eframe::wgpu::FilterMode;
 use egui_plot::{Legend, Line, Plot, PlotPoints};
 
 use crate::flight::{Controls, Flight};
+use crate::help;
 use crate::painter::{Painter, Shown, Wish};
-use crate::panel::Panel;
+use crate::panel::{self, Panel};
 use crate::preset::{self, Shot};
 use crate::sight::Sight;
 use crate::sun::Clock;
@@ -62,6 +63,8 @@ pub struct Start {
     pub rate: Option<f64>,
     /// Forward from the first picture on.
     pub fly: bool,
+    /// Why the window has left without what it was asked for.
+    pub failed: Arc<OnceLock<String>>,
 }
 
 /// The window's state.
@@ -74,6 +77,8 @@ pub struct App {
     time: f64,
     playing: bool,
     clock: Clock,
+    /// Elevation and azimuth of the sun that the clock reads.
+    read: Option<[f32; 2]>,
     quality: Quality,
     quality_name: String,
     exposure: f32,
@@ -91,6 +96,10 @@ pub struct App {
     /// What the last pictures cost, by pass.
     costs: VecDeque<(f64, Vec<(String, f64)>)>,
     captured: bool,
+    /// Whether the keys are listed.
+    help: bool,
+    /// Since when there is nothing but the view.
+    bare: Option<Instant>,
     beside: Beside,
     /// Where the bar between the two is, as a share of the view.
     bar: f32,
@@ -141,6 +150,7 @@ impl App {
             time: 0.0,
             playing: false,
             clock: Clock::default(),
+            read: None,
             quality: Quality::named("balanced")?,
             quality_name: "balanced".into(),
             exposure: 0.0,
@@ -153,6 +163,8 @@ impl App {
             weather: WeatherPanel::default(),
             costs: VecDeque::new(),
             captured: false,
+            help: false,
+            bare: None,
             beside: Beside::Nothing,
             bar: 0.5,
             record: None,
@@ -191,6 +203,16 @@ impl App {
         &self.params
     }
 
+    /// The time of the clouds, s.
+    pub fn time(&self) -> f64 {
+        self.time
+    }
+
+    /// Whether the window closes.
+    pub fn is_leaving(&self) -> bool {
+        self.leaving
+    }
+
     /// Where the bar between the picture and what is beside it is, as a share of the view.
     pub fn bar(&self) -> f32 {
         self.bar
@@ -198,18 +220,22 @@ impl App {
 
     /// One frame of the window.
     pub fn frame(&mut self, ui: &mut Ui, device: Option<&RenderState>) {
-        Self::leave_when_asked(ui);
+        self.hear_commands(ui);
         self.look_at_shaders(ui);
         self.receive(ui, device);
         self.read_dropped_files(ui);
-        egui::Panel::top("top").show(ui, |ui| self.menu(ui));
-        egui::Panel::bottom("status").show(ui, |ui| self.status(ui));
-        egui::Panel::left("panel").resizable(false).exact_size(PANEL).show(ui, |ui| self.settings(ui));
+        self.read_clock();
+        if self.bare.is_none() {
+            egui::Panel::top("top").show(ui, |ui| self.menu(ui));
+            egui::Panel::bottom("status").show(ui, |ui| self.status(ui));
+            egui::Panel::left("panel").resizable(false).exact_size(PANEL).show(ui, |ui| self.settings(ui));
+        }
+        help::keys(ui.ctx(), &mut self.help);
         let view = egui::CentralPanel::no_frame().show(ui, |ui| self.view(ui)).inner;
         self.go_on(ui, &view);
         self.adapt(ui);
         self.ask(ui, view.rect);
-        self.leave_when_done(ui);
+        self.leave_when_done(ui, view.rect);
     }
 
     /// Takes a new picture, or a problem, from the painter.
@@ -218,13 +244,15 @@ impl App {
             // Errors of shaders are drawn with lines that the font lacks.
             Some(problem @ (Error::Parameter(_) | Error::File(_))) => {
                 self.notice = problem.to_string().replace(['┌', '─', '│'], " ");
+                if self.start.frames.is_some() {
+                    // Nobody is there to mend it.
+                    self.give_up(ui, problem.to_string());
+                }
             }
             Some(problem) => {
                 // Nothing more can be painted, and the window is on the same device.
-                eprintln!("{problem}");
                 self.notice = problem.to_string();
-                self.leaving = true;
-                ui.ctx().send_viewport_cmd(ViewportCommand::Close);
+                self.give_up(ui, problem.to_string());
             }
             None => {}
         }
@@ -251,9 +279,33 @@ impl App {
         self.shown = Some(shown);
     }
 
-    fn leave_when_asked(ui: &Ui) {
-        if ui.input_mut(|input| input.consume_key(egui::Modifiers::COMMAND, Key::Q)) {
+    /// Keys of the window itself.
+    fn hear_commands(&mut self, ui: &Ui) {
+        let pressed = |modifiers, key| ui.input_mut(|input| input.consume_key(modifiers, key));
+        if pressed(egui::Modifiers::COMMAND, Key::Q) {
             ui.ctx().send_viewport_cmd(ViewportCommand::Close);
+        }
+        if pressed(egui::Modifiers::NONE, Key::F1) {
+            self.help = !self.help;
+        }
+        if pressed(egui::Modifiers::NONE, Key::F2) {
+            self.bare = self.bare.is_none().then(Instant::now);
+        }
+    }
+
+    /// Leaves without what was asked for, and says why.
+    fn give_up(&mut self, ui: &Ui, why: String) {
+        self.leaving = true;
+        let _ = self.start.failed.set(why);
+        ui.ctx().send_viewport_cmd(ViewportCommand::Close);
+    }
+
+    /// Where something else has put the sun, the clock goes to the hour at which it stands there.
+    fn read_clock(&mut self) {
+        let sun = [self.params.sun.elevation, self.params.sun.azimuth];
+        if self.read != Some(sun) {
+            self.clock = self.clock.at_sun(f64::from(sun[0]), f64::from(sun[1]));
+            self.read = Some(sun);
         }
     }
 
@@ -280,7 +332,7 @@ impl App {
 
     fn menu(&mut self, ui: &mut Ui) {
         ui.horizontal_wrapped(|ui| {
-            egui::ComboBox::from_label("scene").selected_text("go to").show_ui(ui, |ui| {
+            panel::menu(ui, "scene", "go to", |ui| {
                 for (name, camera, params) in &self.scenes {
                     if ui.selectable_label(false, name.replace('_', " ")).clicked() {
                         (self.flight, self.params) = (Flight::at(camera), params.clone());
@@ -293,7 +345,7 @@ impl App {
                 }
             }
             ui.separator();
-            egui::ComboBox::from_label("at rest").selected_text(&self.quality_name).show_ui(ui, |ui| {
+            panel::menu(ui, "at rest", &self.quality_name.clone(), |ui| {
                 for name in QUALITIES {
                     if ui.selectable_label(self.quality_name == name, name).clicked()
                         && let Ok(quality) = Quality::named(name)
@@ -302,19 +354,17 @@ impl App {
                     }
                 }
             });
-            egui::ComboBox::from_label("shown").selected_text(self.sight.name()).show_ui(ui, |ui| {
+            panel::menu(ui, "shown", self.sight.name(), |ui| {
                 for sight in Sight::ALL {
                     ui.selectable_value(&mut self.sight, sight, sight.name());
                 }
             });
-            // All of them, without scrolling.
-            let menu = egui::ComboBox::from_label("beside").selected_text(self.beside.name()).height(400.0);
-            menu.show_ui(ui, |ui| {
+            panel::menu(ui, "beside", &self.beside.name(), |ui| {
                 for beside in Beside::all() {
                     ui.selectable_value(&mut self.beside, beside, beside.name());
                 }
             });
-            egui::ComboBox::from_label("tone map").selected_text(self.tone_map).show_ui(ui, |ui| {
+            panel::menu(ui, "tone map", self.tone_map, |ui| {
                 for name in TONE_MAPS {
                     ui.selectable_value(&mut self.tone_map, name, name);
                 }
@@ -345,10 +395,16 @@ impl App {
                 self.say(copied, "copied".into());
             }
             ui.separator();
-            let exposure = egui::Slider::new(&mut self.exposure, EXPOSURES).suffix(" stops").text("exposure");
-            ui.add_enabled(!self.auto, exposure);
+            let exposure = egui::Slider::new(&mut self.exposure, EXPOSURES).suffix(" stops");
+            panel::labelled(ui, "exposure", |ui| ui.add_enabled(!self.auto, exposure));
             ui.checkbox(&mut self.auto, "auto").on_hover_text("as the last picture at rest asks for");
-            ui.add(egui::Slider::new(&mut self.rate, 2.0..=120.0).logarithmic(true).suffix(" Hz").text("wanted"));
+            let rate = egui::Slider::new(&mut self.rate, 2.0..=120.0).logarithmic(true).suffix(" Hz");
+            panel::labelled(ui, "wanted", |ui| ui.add(rate)).on_hover_text("frames a second while anything moves");
+            ui.separator();
+            ui.toggle_value(&mut self.help, "F1 keys");
+            if ui.button("F2 view alone").on_hover_text("hides the panels").clicked() {
+                self.bare = Some(Instant::now());
+            }
         });
     }
 
@@ -417,7 +473,11 @@ impl App {
             egui::CollapsingHeader::new("time").default_open(true).show(ui, |ui| self.times(ui));
             egui::CollapsingHeader::new("weather map").show(ui, |ui| self.weather_map(ui));
             egui::CollapsingHeader::new("cost").show(ui, |ui| self.plot(ui));
-            self.panel.sky(ui, &mut self.params);
+            let before = self.params.clone();
+            if self.panel.sky(ui, &mut self.params) {
+                // Another wind blows from now on: the clouds go on from where they are.
+                self.params.drift = self.params.after(&before, self.time);
+            }
             let usual = Quality::named(&self.quality_name).unwrap_or_default();
             self.panel.quality(ui, &mut self.quality, &usual);
         });
@@ -428,16 +488,25 @@ impl App {
         ui.horizontal(|ui| {
             ui.toggle_value(&mut self.playing, "wind blows");
             ui.add(egui::DragValue::new(&mut self.time).speed(1.0).suffix(" s"));
-        });
-        let before = self.clock;
-        ui.horizontal(|ui| {
+            ui.separator();
             ui.toggle_value(&mut self.clock.playing, "sun moves");
-            ui.add(egui::Slider::new(&mut self.clock.hour, 0.0..=24.0).suffix(" h").text("hour"));
         });
-        ui.add(egui::Slider::new(&mut self.clock.rate, 0.1..=60.0).logarithmic(true).suffix(" h/min").text("rate"));
-        ui.add(egui::Slider::new(&mut self.clock.latitude, -90.0..=90.0).suffix("°").text("latitude"));
-        ui.add(egui::Slider::new(&mut self.clock.day, 1..=365).text("day of the year"));
-        let changed = Clock { playing: before.playing, rate: before.rate, ..self.clock } != before;
+        let before = Clock { playing: false, ..self.clock };
+        // Formatted and not rounded: what a slider rounds, it changes.
+        let hour =
+            egui::Slider::new(&mut self.clock.hour, 0.0..=24.0).suffix(" h").custom_formatter(|v, _| format!("{v:.2}"));
+        panel::field(ui, "hour", |ui| ui.add(hour)).on_hover_text("local solar time: the sun is highest about noon");
+        let rate = egui::Slider::new(&mut self.clock.rate, 0.1..=60.0).logarithmic(true).suffix(" h/min");
+        panel::field(ui, "rate", |ui| ui.add(rate));
+        let latitude = egui::Slider::new(&mut self.clock.latitude, -90.0..=90.0)
+            .suffix("°")
+            .custom_formatter(|v, _| format!("{v:.1}"));
+        panel::field(ui, "latitude", |ui| ui.add(latitude));
+        panel::field(ui, "day of the year", |ui| ui.add(egui::Slider::new(&mut self.clock.day, 1..=365)));
+        if self.clock.by_hand {
+            ui.weak("The sun is placed by hand; this is the nearest hour.");
+        }
+        let changed = Clock { playing: false, rate: before.rate, ..self.clock } != before;
         if changed {
             self.set_sun();
         }
@@ -473,7 +542,9 @@ impl App {
     fn set_sun(&mut self) {
         match self.clock.sun() {
             Ok((elevation, azimuth)) => {
-                (self.params.sun.elevation, self.params.sun.azimuth) = (elevation as f32, azimuth as f32);
+                let sun = [elevation as f32, azimuth as f32];
+                [self.params.sun.elevation, self.params.sun.azimuth] = sun;
+                (self.read, self.clock.by_hand) = (Some(sun), false);
             }
             Err(error) => self.notice = format!("{error:#}"),
         }
@@ -519,6 +590,9 @@ impl App {
             let handle = ui.interact(line.expand(5.0), ui.scope_id().with("bar"), Sense::drag());
             self.bar = (self.bar + handle.drag_delta().x / rect.width()).clamp(0.02, 0.98);
             handle.on_hover_and_drag_cursor(egui::CursorIcon::ResizeHorizontal);
+        }
+        if let Some(since) = self.bare {
+            help::way_back(ui, rect, since);
         }
         response.on_hover_cursor(egui::CursorIcon::Crosshair)
     }
@@ -646,11 +720,25 @@ impl App {
         self.asked = Some(wish);
     }
 
-    /// After as many pictures as were asked for, perhaps with a picture of the window.
-    fn leave_when_done(&mut self, ui: &Ui) {
-        let count = self.shown.as_ref().map_or(0, |shown| shown.count);
-        if self.leaving || self.start.frames.is_none_or(|frames| count < frames) {
+    /// After as many pictures as were asked for, or all that there will be, perhaps with a picture of the window.
+    fn leave_when_done(&mut self, ui: &Ui, view: egui::Rect) {
+        let Some(frames) = self.start.frames.filter(|_| !self.leaving) else { return };
+        if view.width() < 1.0 || view.height() < 1.0 {
+            let why = format!(
+                "the window has no room for a picture beside the panel of {PANEL} points: --size must be larger"
+            );
+            self.give_up(ui, why);
             return;
+        }
+        let count = self.shown.as_ref().map_or(0, |shown| shown.count);
+        // Where nothing moves there is one picture by the moving method and one at its best, and no other.
+        let is_last = |shown: &Shown| shown.still.is_some() && self.asked.as_ref() == Some(&*shown.wish);
+        let at_rest = !self.start.fly && self.shown.as_ref().is_some_and(is_last);
+        if count < frames && !at_rest {
+            return;
+        }
+        if count < frames {
+            println!("{count} pictures, not {frames}: nothing moves (--fly flies ahead)");
         }
         self.leaving = true;
         self.print_intervals();
@@ -658,11 +746,11 @@ impl App {
             ui.ctx().send_viewport_cmd(ViewportCommand::Close);
             return;
         };
-        let context = ui.ctx().clone();
+        let (context, failed) = (ui.ctx().clone(), self.start.failed.clone());
         ui.ctx().request_screenshot(move |image| {
             let pixels: Vec<_> = image.pixels.iter().flat_map(|pixel| pixel.to_array()).collect();
             if let Err(error) = files::write_png(&path, &pixels, image.size, 4) {
-                eprintln!("{error}");
+                let _ = failed.set(error.to_string());
             }
             context.send_viewport_cmd(ViewportCommand::Close);
         });

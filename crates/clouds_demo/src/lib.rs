@@ -4,6 +4,7 @@
 
 pub mod app;
 pub mod flight;
+pub mod help;
 pub mod painter;
 pub mod panel;
 pub mod preset;

@@ -1,9 +1,11 @@
 //! `clouds_demo`: opens the window.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::{Context as _, Result, anyhow};
+use std::sync::Arc;
+
+use anyhow::{Context as _, Result, anyhow, bail, ensure};
 use clap::Parser;
 use clouds_core::Gpu;
 use clouds_demo::app::{App, Start};
@@ -11,7 +13,7 @@ use eframe::egui::ViewportBuilder;
 use eframe::egui_wgpu::{WgpuConfiguration, WgpuSetup, WgpuSetupExisting};
 
 /// Fly through clouds. W A S D move, Q and E go down and up, F lands and takes off, Space jumps, Shift is fast, Control slow,
-/// the wheel sets the speed, Control and Q leave; drag to look around, or click to take the pointer and press Esc to give it back.
+/// the wheel sets the speed, F1 lists the keys, F2 hides the panels, Control and Q leave; drag to look around, or click to take the pointer and press Esc to give it back.
 #[derive(Parser)]
 struct Arguments {
     /// A scene, such as fair_weather or storm, or a TOML file
@@ -26,11 +28,11 @@ struct Arguments {
     /// Frames a second that are wanted while anything moves: the resolution follows
     #[arg(long, value_parser = rate)]
     rate: Option<f64>,
-    /// Leave after so many pictures
-    #[arg(long)]
+    /// Leave after so many pictures, or where nothing moves after the one at rest, which is the second
+    #[arg(long, value_parser = clap::value_parser!(u64).range(1..))]
     frames: Option<u64>,
     /// Save a picture of the window (PNG) before leaving
-    #[arg(long, requires = "frames")]
+    #[arg(long, requires = "frames", value_parser = png)]
     screenshot: Option<PathBuf>,
     /// Fly ahead from the first picture on
     #[arg(long)]
@@ -44,6 +46,14 @@ fn size(text: &str) -> Result<(f32, f32)> {
         (64..=16384).contains(&side).then_some(f32::from(side)).context("each must be from 64 to 16384")
     };
     Ok((side(width)?, side(height)?))
+}
+
+fn png(text: &str) -> Result<PathBuf> {
+    let path = PathBuf::from(text);
+    path.extension().filter(|ending| ending.eq_ignore_ascii_case("png")).context("its name must end with .png")?;
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    ensure!(folder.is_none_or(Path::is_dir) && !path.is_dir(), "it must be a file in a folder that exists");
+    Ok(path)
 }
 
 fn rate(text: &str) -> Result<f64> {
@@ -87,7 +97,13 @@ fn run(arguments: Arguments) -> Result<()> {
         screenshot: arguments.screenshot,
         rate: arguments.rate,
         fly: arguments.fly,
+        failed: Arc::default(),
     };
+    let failed = start.failed.clone();
     eframe::run_native("nubis", options, Box::new(|context| Ok(Box::new(App::new(&context.egui_ctx, gpu, start)?))))
-        .map_err(|error| anyhow!("{error}"))
+        .map_err(|error| anyhow!("{error}"))?;
+    match failed.get() {
+        Some(why) => bail!("{why}"),
+        None => Ok(()),
+    }
 }

@@ -2,10 +2,49 @@
 
 use clouds_core::params::{Params, Quality};
 use clouds_core::schema::{Block, Field, Type, Value, assign};
-use eframe::egui::{self, Color32, RichText, Slider, Ui};
+use eframe::egui::{self, Color32, Response, RichText, Slider, Ui, WidgetText};
 
 /// Ranges wider than this are in decades.
 const WIDE: f64 = 300.0;
+/// Points of the column of names in a panel.
+const NAMES: f32 = 128.0;
+/// Points of a slider beside it: with its number and its unit they fill the panel.
+const SLIDER: f32 = 90.0;
+
+/// A name, and its widget after it.
+pub fn labelled(ui: &mut Ui, name: &str, widget: impl FnOnce(&mut Ui) -> Response) -> Response {
+    let label = ui.label(name);
+    widget(ui).labelled_by(label.id)
+}
+
+/// A row of a panel: names in a column, and their widgets after them.
+pub fn field(ui: &mut Ui, name: impl Into<WidgetText>, widget: impl FnOnce(&mut Ui) -> Response) -> Response {
+    ui.horizontal(|ui| {
+        let label = column(ui, name);
+        widget(ui).labelled_by(label.id)
+    })
+    .inner
+}
+
+/// A menu after its name, with room for all choices.
+pub fn menu(ui: &mut Ui, name: &str, chosen: &str, choices: impl FnOnce(&mut Ui)) {
+    labelled(ui, name, |ui| {
+        let menu = egui::ComboBox::from_id_salt(name).selected_text(chosen).height(400.0);
+        menu.show_ui(ui, choices).response
+    });
+}
+
+/// A name in the column of names.
+fn column(ui: &mut Ui, name: impl Into<WidgetText>) -> Response {
+    ui.spacing_mut().slider_width = SLIDER;
+    let size = egui::vec2(NAMES, ui.spacing().interact_size.y);
+    let layout = egui::Layout::left_to_right(egui::Align::Center);
+    let place = ui.allocate_ui_with_layout(size, layout, |ui| {
+        ui.set_min_width(NAMES);
+        ui.add(egui::Label::new(name).truncate())
+    });
+    place.inner
+}
 
 /// What the user has asked for in a panel.
 #[derive(Default)]
@@ -52,6 +91,10 @@ impl Panel {
     fn block(&self, ui: &mut Ui, name: &str, block: &mut dyn Block, usual: &dyn Block) -> bool {
         let search = self.search.trim().to_lowercase();
         let wanted = |field: &Field| {
+            // What follows from the winds of before is no matter of sliders.
+            if matches!(field.ty, Type::Exact(_)) {
+                return false;
+            }
             search.is_empty() || format!("{name}.{} {}", field.name, field.doc).to_lowercase().contains(&search)
         };
         let fields: Vec<_> = block.fields().iter().enumerate().filter(|(_, field)| wanted(field)).collect();
@@ -82,13 +125,13 @@ fn row(ui: &mut Ui, block: &str, field: &Field, value: &mut Value, usual: &Value
         response.on_hover_text(format!("{block}.{}\n{}{unit}\n{}", field.name, field.doc.trim(), field.allowed()))
     };
     ui.horizontal(|ui| {
+        let name = field.name.replace('_', " ");
+        let label = hover(column(ui, if value == usual { RichText::new(name) } else { RichText::new(name).strong() }));
         let back = ui.add_enabled(value != usual, egui::Button::new("×").small());
         if back.on_hover_text(format!("back to {usual}")).clicked() {
             *value = usual.clone();
         }
-        hover(widget(ui, field, value));
-        let name = field.name.replace('_', " ");
-        hover(ui.label(if value == usual { RichText::new(name) } else { RichText::new(name).strong() }));
+        hover(widget(ui, field, value).labelled_by(label.id));
     });
 }
 

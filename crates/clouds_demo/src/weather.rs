@@ -7,8 +7,12 @@ use clouds_core::params::Weather;
 use clouds_core::schema::Map;
 use eframe::egui::{self, Color32, ColorImage, Sense, TextureOptions, Ui, Vec2, pos2};
 
+use crate::panel;
+
 /// Channels of a weather map.
 const CHANNELS: [&str; 3] = ["coverage", "type", "precipitation"];
+/// The colours that they are shown in.
+const COLOURS: [(&str, Color32); 3] = [("red", Color32::RED), ("green", Color32::GREEN), ("blue", Color32::BLUE)];
 /// Points across the map in the panel.
 const SIDE: f32 = 256.0;
 
@@ -80,7 +84,8 @@ impl WeatherPanel {
                 params.weather.map = None;
                 self.step(params, 0.0);
             }
-            ui.add(egui::Slider::new(self.seconds.get_or_insert(30.0), 0.0..=300.0).suffix(" s"));
+            let seconds = egui::Slider::new(self.seconds.get_or_insert(30.0), 0.0..=300.0).suffix(" s");
+            panel::labelled(ui, "comes in", |ui| ui.add(seconds));
         });
         let Some(map) = map else { return };
         let (rect, response) = ui.allocate_exact_size(Vec2::splat(SIDE), Sense::click_and_drag());
@@ -96,16 +101,20 @@ impl WeatherPanel {
             self.brush.dab(Arc::make_mut(&mut painted), [at.x, at.y]);
             params.weather.map = Some(painted);
         }
-        response.on_hover_text("red coverage, green type, blue precipitation; drag to paint");
-        ui.horizontal(|ui| {
-            egui::ComboBox::from_id_salt("channel").selected_text(CHANNELS[self.brush.channel]).show_ui(ui, |ui| {
+        response.on_hover_text("drag to paint");
+        legend(ui);
+        panel::field(ui, "brush paints", |ui| {
+            let menu = egui::ComboBox::from_id_salt("channel").selected_text(CHANNELS[self.brush.channel]);
+            let choices = |ui: &mut Ui| {
                 for (index, name) in CHANNELS.iter().enumerate() {
                     ui.selectable_value(&mut self.brush.channel, index, *name);
                 }
-            });
-            ui.add(egui::Slider::new(&mut self.brush.amount, -0.5..=0.5).text("brush"));
+            };
+            menu.show_ui(ui, choices).response
         });
-        ui.add(egui::Slider::new(&mut self.brush.radius, 0.01..=0.5).logarithmic(true).text("radius"));
+        panel::field(ui, "adds", |ui| ui.add(egui::Slider::new(&mut self.brush.amount, -0.5..=0.5)));
+        let radius = egui::Slider::new(&mut self.brush.radius, 0.01..=0.5).logarithmic(true);
+        panel::field(ui, "radius", |ui| ui.add(radius)).on_hover_text("as a share of the map");
         if ui.add_enabled(params.weather.map.is_some(), egui::Button::new("Forget what is painted")).clicked() {
             params.weather.map = None;
         }
@@ -137,6 +146,18 @@ impl WeatherPanel {
         self.drawn = Some(map.clone());
         self.texture.insert(texture).id()
     }
+}
+
+/// What the colours of the map mean.
+fn legend(ui: &mut Ui) {
+    ui.horizontal(|ui| {
+        for (channel, (name, colour)) in CHANNELS.iter().zip(COLOURS) {
+            let (swatch, _) = ui.allocate_exact_size(Vec2::splat(10.0), Sense::hover());
+            ui.painter().rect_filled(swatch, 2.0, colour);
+            ui.label(format!("{name}: {channel}"));
+        }
+    });
+    ui.weak("Black is 0, a full colour 1. North is up; the ring is you.");
 }
 
 #[cfg(test)]

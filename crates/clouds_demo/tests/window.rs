@@ -97,8 +97,7 @@ fn the_search_leaves_the_fields_that_are_meant_and_they_change_the_sky() {
     harness.run_steps(5);
     assert!(harness.query_by_label("clouds").is_none());
     assert!(harness.state().params().atmosphere.beams);
-    // The first is that of the automatic exposure.
-    harness.get_all_by_role(Role::CheckBox).nth(1).expect("is found").click();
+    harness.get_by_role_and_label(Role::CheckBox, "beams").click();
     harness.run_steps(3);
     assert!(!harness.state().params().atmosphere.beams);
     at_rest(&mut harness);
@@ -174,6 +173,112 @@ fn drag(harness: &mut Harness<'_, App>, from: Pos2, by: Vec2) {
     }
     harness.drop_at(from + by);
     harness.step();
+}
+
+/// The value of a slider by its name.
+fn slider(harness: &Harness<'_, App>, name: &str) -> f64 {
+    let node = harness.get_by_role_and_label(Role::Slider, name);
+    node.accesskit_node().numeric_value().expect("is a number")
+}
+
+#[test]
+fn keys_are_listed_and_panels_hidden() {
+    let mut harness = window(Start::default());
+    harness.run_steps(2);
+    let is_there = |harness: &Harness<'_, App>, what: &str| harness.query_by_label_contains(what).is_some();
+    assert!(!is_there(&harness, "five times as fast") && is_there(&harness, "Save picture"));
+    harness.key_press(Key::F1);
+    harness.run_steps(3);
+    for what in ["five times as fast", "F1", "F2", "leave"] {
+        assert!(harness.query_all_by_label_contains(what).next().is_some(), "{what}");
+    }
+    harness.key_press(Key::F1);
+    harness.run_steps(3);
+    assert!(!is_there(&harness, "five times as fast"));
+    harness.key_press(Key::F2);
+    until(&mut harness, "the view alone", |app| {
+        app.shown().is_some_and(|shown| shown.wish.window == [500, 400] && shown.still.is_some())
+    });
+    assert!(!is_there(&harness, "Save picture") && !is_there(&harness, "clouds"));
+    harness.key_press(Key::F2);
+    harness.run_steps(3);
+    assert!(is_there(&harness, "Save picture"));
+}
+
+#[test]
+fn another_wind_moves_no_cloud() {
+    let mut harness = window(Start::default());
+    harness.run_steps(2);
+    // An hour on.
+    drop_file(&mut harness, "windy", "[wind]\nspeed = 12.0\n[drift]\nshape = [-1000.0, 500.0]\n");
+    let before = harness.state().params().clone();
+    harness.get_by_role(Role::TextInput).focus();
+    harness.run_steps(2);
+    harness.get_by_role(Role::TextInput).type_text("wind.updraft");
+    harness.run_steps(5);
+    harness.get_by_role_and_label(Role::Slider, "updraft").focus();
+    harness.run_steps(2);
+    harness.key_press(Key::ArrowRight);
+    harness.run_steps(3);
+    let after = harness.state().params().clone();
+    assert!(after.wind.updraft != before.wind.updraft);
+    let time = harness.state().time();
+    assert_eq!(after.drift, after.after(&before, time));
+    assert_eq!(after.drift.shape, before.drift.shape);
+}
+
+#[test]
+fn the_hour_is_that_of_the_sun_and_names_stand_before_their_widgets() {
+    let mut harness = window(Start { scene: Some("sunset".into()), ..Start::default() });
+    harness.run_steps(3);
+    let sun = |harness: &Harness<'_, App>| {
+        let sun = &harness.state().params().sun;
+        [sun.elevation, sun.azimuth]
+    };
+    let [elevation, azimuth] = sun(&harness);
+    assert!(slider(&harness, "hour") > 15.0, "{}", slider(&harness, "hour"));
+    // A point of the slider, a third of an hour: the sun goes five degrees on, and not to the morning.
+    harness.get_by_role_and_label(Role::Slider, "hour").focus();
+    harness.run_steps(2);
+    harness.key_press(Key::ArrowRight);
+    harness.run_steps(3);
+    let [lower, later] = sun(&harness);
+    assert!((lower, later) != (elevation, azimuth) && (lower - elevation).abs() < 6.0 && (later - azimuth).abs() < 6.0);
+    // Another scene has another hour, and a sun placed by hand too.
+    drop_file(&mut harness, "morning", "[sun]\nelevation = 10.0\nazimuth = 80.0\n");
+    harness.run_steps(2);
+    assert!(slider(&harness, "hour") < 9.0, "{}", slider(&harness, "hour"));
+    for name in ["hour", "latitude", "exposure", "wanted"] {
+        let label = harness.get_by_role_and_label(Role::Label, name).rect();
+        let widget = harness.get_by_role_and_label(Role::Slider, name).rect();
+        assert!(label.right() <= widget.left(), "{name}: {label} {widget}");
+    }
+}
+
+#[test]
+fn the_colours_of_the_weather_map_have_a_legend() {
+    let mut harness = window(Start::default());
+    at_rest(&mut harness);
+    harness.get_by_label("weather map").click();
+    harness.run_steps(4);
+    for entry in ["red: coverage", "green: type", "blue: precipitation"] {
+        assert!(harness.query_by_label(entry).is_some(), "{entry}");
+    }
+}
+
+/// However few pictures there are to come, and wherever one has no room, the window leaves.
+#[test]
+fn what_asks_for_pictures_ends() {
+    for (frames, fly, size) in
+        [(1, false, 500.0), (2, false, 500.0), (50, false, 500.0), (6, true, 500.0), (3, true, 300.0)]
+    {
+        let start = Start { frames: Some(frames), fly, ..Start::default() };
+        let failed = start.failed.clone();
+        let mut harness = window(start);
+        harness.set_size(Vec2::new(size, 400.0));
+        until(&mut harness, "leaves", App::is_leaving);
+        assert_eq!(failed.get().is_some(), size < PANEL, "{:?}", failed.get());
+    }
 }
 
 /// The pixels of what is shown, and of what is beside it.

@@ -13,6 +13,7 @@ use clouds_core::params::{Params, Quality};
 use clouds_core::renderer::Renderer as CoreRenderer;
 use clouds_core::scene_depth::SceneDepth;
 use clouds_core::schema::Value;
+use clouds_core::wind::{Between, Carried, NUMBERS};
 use clouds_core::{DensityGrid as CoreGrid, Error, Result, cache, color, files, params, schema};
 use glam::DVec3;
 use numpy::{PyArray1, PyArrayMethods as _, PyReadonlyArrayDyn, PyUntypedArrayMethods as _};
@@ -628,12 +629,57 @@ fn check_quality(quality: &Bound<'_, PyAny>) -> PyResult<()> {
 #[pyfunction]
 fn quality<'py>(py: Python<'py>, name: &Bound<'py, PyString>) -> PyResult<Bound<'py, PyDict>> {
     let quality = raise(py, Quality::named(&name.to_string_lossy()))?;
-    let block: &dyn schema::Block = &quality;
+    fields(py, &quality)
+}
+
+/// The values of a block by name.
+fn fields<'py>(py: Python<'py>, block: &dyn schema::Block) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
     for (index, field) in block.fields().iter().enumerate() {
         dict.set_item(field.name, value_to_python(py, &block.get(index))?)?;
     }
     Ok(dict)
+}
+
+/// The fields of the drift with which a sky goes on from another.
+#[pyfunction]
+fn drift_after<'py>(params: &Bound<'py, PyAny>, before: &Bound<'py, PyAny>, time: f64) -> PyResult<Bound<'py, PyDict>> {
+    fields(params.py(), &params_from_python(params)?.after(&params_from_python(before)?, time))
+}
+
+/// The fields of the drift of a sky that has carried things so far at a time, beside the drift that it has.
+#[pyfunction]
+fn drift_of<'py>(params: &Bound<'py, PyAny>, time: f64, carried: [f64; NUMBERS]) -> PyResult<Bound<'py, PyDict>> {
+    let py = params.py();
+    let params = params_from_python(params)?;
+    let carried = Carried::from(carried).plus(&Carried::from(&params.drift), 1.0);
+    fields(py, &carried.drift_of(&params, time))
+}
+
+/// How far a sky has carried things from 0 s to a time, beside its drift.
+#[pyfunction]
+fn carried(params: &Bound<'_, PyAny>, time: f64) -> PyResult<[f64; NUMBERS]> {
+    Ok(Carried::new(&params_from_python(params)?, 0.0, time).numbers())
+}
+
+/// How far things are carried on the way from one sky to another, from `start` to `time`, by a wander that is `swings` ahead.
+#[pyfunction]
+fn carried_between(
+    skies: [Bound<'_, PyAny>; 2],
+    span: [f64; 2],
+    smooth: bool,
+    swings: f64,
+    time: f64,
+) -> PyResult<[f64; NUMBERS]> {
+    let py = skies[0].py();
+    let [from, to] = [params_from_python(&skies[0])?, params_from_python(&skies[1])?];
+    detached(py, |_| Between { skies: [&from, &to], span, smooth }.carried(swings, time)).map(|sum| sum.numbers())
+}
+
+/// Whether what winds carry moves alike in two skies.
+#[pyfunction]
+fn same_winds(a: &Bound<'_, PyAny>, b: &Bound<'_, PyAny>) -> PyResult<bool> {
+    Ok(params_from_python(a)?.has_winds_of(&params_from_python(b)?))
 }
 
 /// The number that is given for an argument called `name`, or `ParameterError`.
@@ -700,7 +746,8 @@ fn clear_cache(py: Python<'_>) -> PyResult<()> {
 mod _nubis {
     #[pymodule_export]
     use super::{
-        Camera, DensityGrid, Renderer, adapters, auto_exposure, cache_usage, check, check_params, check_quality,
-        clear_cache, number, quality, read_pixels, to_srgb8, write_exr, write_hdr, write_png,
+        Camera, DensityGrid, Renderer, adapters, auto_exposure, cache_usage, carried, carried_between, check,
+        check_params, check_quality, clear_cache, drift_after, drift_of, number, quality, read_pixels, same_winds,
+        to_srgb8, write_exr, write_hdr, write_png,
     };
 }

@@ -27,7 +27,7 @@ pub(crate) type Shadows = (
     [f32; 2],
     (params::Clouds, params::UpperClouds),
     (params::Weather, Vec<(params::Weather, f32)>),
-    (params::Wind, params::Wander),
+    (params::Wind, params::Wander, params::Drift),
 );
 
 pub(crate) fn shadows(params: &Params) -> Shadows {
@@ -35,7 +35,7 @@ pub(crate) fn shadows(params: &Params) -> Shadows {
         [params.sun.elevation, params.sun.azimuth],
         (params.clouds.clone(), params.upper_clouds.clone()),
         (params.weather.clone(), params.weather_mix.clone()),
-        (params.wind.clone(), params.wander.clone()),
+        (params.wind.clone(), params.wander.clone(), params.drift.clone()),
     )
 }
 

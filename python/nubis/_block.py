@@ -142,7 +142,7 @@ class Root(Base):
                 whole[block] = _grid(fields)
                 continue
             for name, value in fields.items():
-                changes[f"{block}.{name}"] = _plain(block, name, value)
+                changes[f"{block}.{name}"] = value
         # Last, since a mixture must fit the weather that it goes with.
         return cls().with_(**changes).replace(**whole)
 
@@ -157,7 +157,7 @@ class Root(Base):
             block: [given(f) for f in fields] if isinstance(fields, list) else given(fields)
             for block, fields in self.to_dict().items()
         }
-        Path(path).write_text(tomli_w.dumps(tables), encoding="utf-8")
+        _nubis.write_bytes(path, tomli_w.dumps(tables).encode())
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
@@ -171,11 +171,6 @@ class Root(Base):
                 f"path = {os.fspath(path)!r} is not allowed: it must be a TOML file ({error})"
             ) from error
         return cls.from_dict(values)
-
-
-def _plain(block: str, name: str, value: Any) -> Any:
-    deep = isinstance(value, list) and value and isinstance(value[0], list)
-    return _array(block, name, value) if deep else value
 
 
 def _mixture(value: Any) -> tuple[tuple[Block, float], ...]:
@@ -217,18 +212,9 @@ def _mixture_from_tables(tables: Any) -> Sequence[tuple[Block, Any]]:
         for name, value in table.items():
             if name not in (*names, "weight"):
                 raise _unknown(f"{path}.{name}", value, ["weight", *names])
-        fields = {n: _plain(path, n, v) for n, v in table.items() if n != "weight"}
+        fields = {n: v for n, v in table.items() if n != "weight"}
         mixture.append((Weather(**fields), table["weight"]))
     return mixture
-
-
-def _array(block: str, name: str, value: list[Any]) -> np.ndarray[Any, Any]:
-    try:
-        return np.array(value, dtype=np.float32)
-    except (TypeError, ValueError) as error:
-        raise ParameterError(
-            f"{block}.{name} = (nested lists) is not allowed: they must form an array ({error})"
-        ) from error
 
 
 def _grid(fields: Mapping[str, Any]) -> DensityGrid:
@@ -239,7 +225,7 @@ def _grid(fields: Mapping[str, Any]) -> DensityGrid:
     for name in names:
         if name not in fields:
             raise ParameterError(f"volume.{name} is missing: a volume has {' and '.join(names)}")
-    return DensityGrid(_array("volume", "extinction", fields["extinction"]), fields["bounds"])
+    return DensityGrid(fields["extinction"], fields["bounds"])
 
 
 def _unknown(path: str, value: Any, names: list[str]) -> ParameterError:

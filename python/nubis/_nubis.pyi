@@ -19,11 +19,13 @@ __all__ = [
     "check",
     "check_params",
     "check_quality",
+    "check_target",
     "clear_cache",
     "number",
     "quality",
     "read_pixels",
     "to_srgb8",
+    "write_bytes",
     "write_exr",
     "write_hdr",
     "write_png",
@@ -257,9 +259,11 @@ def read_pixels(path: str | PathLike[str]) -> npt.NDArray[np.float32]:
     """The numbers in a PNG, HDR or EXR file, shape (H, W, 1) or (H, W, 3)."""
 
 def to_srgb8(
-    frame: npt.NDArray[np.float32], exposure: float, tonemap: str
+    frame: npt.NDArray[np.float32], exposure: float, tonemap: str, dither: bool
 ) -> npt.NDArray[np.uint8]: ...
 def auto_exposure(frame: npt.NDArray[np.float32], key: float, low: float, high: float) -> float: ...
+def check_target(path: str | PathLike[str]) -> None: ...
+def write_bytes(path: str | PathLike[str], bytes: bytes) -> None: ...
 def write_png(path: str | PathLike[str], frame: npt.NDArray[np.uint8]) -> None: ...
 def write_exr(path: str | PathLike[str], frame: npt.NDArray[np.float32]) -> None: ...
 def write_hdr(path: str | PathLike[str], frame: npt.NDArray[np.float32]) -> None: ...

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nubis import _nubis
+from nubis._arrays import numbers
 from nubis._errors import ParameterError
 from nubis._nubis import Camera
 from nubis._scene_depth import checked as checked_scene
@@ -412,13 +413,8 @@ class Renderer:
             For a place, extent or size that is not allowed.
         """
         _check_params(params)
-        try:
-            x, y = center
-        except Exception:  # whatever a class of its own raises
-            raise ParameterError(
-                f"center = {center!r} is not allowed: it must be 2 numbers"
-            ) from None
-        place = _nubis.number("center", x), _nubis.number("center", y)
+        x, y = numbers("center", center, "2 finite numbers", shapes=[(2,)])
+        place = float(x), float(y)
         side, z = _nubis.number("extent", extent), _nubis.number("altitude", altitude)
         texels = _size("size", size)
         map_ = self._core.shadow_map(params, _time(time), place, z, side, texels)

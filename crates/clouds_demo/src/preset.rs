@@ -141,7 +141,7 @@ fn value(given: &Toml) -> Result<Value> {
 
 /// Writes all parameters to a TOML file that the Python package reads too.
 pub fn save(path: &Path, params: &Params) -> Result<()> {
-    std::fs::write(path, to_toml(params)?).with_context(|| format!("{} cannot be written", path.display()))
+    Ok(clouds_core::files::write_bytes(path, to_toml(params)?.as_bytes())?)
 }
 
 fn to_toml(params: &Params) -> Result<String> {

@@ -20,7 +20,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString, PyTuple};
 
 use convert::{
-    number_from_python, params_from_python, quality_from_python, value_from_python, value_to_python, vector_from_python,
+    number_from_python, numbers_from_python, params_from_python, quality_from_python, value_from_python, value_to_python, vector_from_python,
 };
 
 /// The exception of the package that an error of the core becomes.
@@ -130,10 +130,10 @@ impl Camera {
         convention: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let py = world_from_camera.py();
-        let rows = world_from_camera.extract::<[[f64; 4]; 4]>().map_err(|_| {
-            let given = world_from_camera.str().map_or_else(|_| "?".into(), |text| text.to_string());
-            exception(py, &Error::parameter("world_from_camera", given, "a 4 x 4 matrix of numbers"))
-        })?;
+        let (shape, allowed) = ([Some(4); 2], "a 4 x 4 matrix of finite numbers");
+        let matrix = numbers_from_python("world_from_camera", world_from_camera, allowed, &[&shape], &[])?;
+        let numbers = matrix.as_slice()?;
+        let rows = std::array::from_fn(|row| std::array::from_fn(|column| numbers[4 * row + column]));
         let convention = match convention.map_or(Ok(Value::Text("opengl".into())), value_from_python)? {
             Value::Text(word) if word == "opengl" => Convention::OpenGl,
             Value::Text(word) if word == "opencv" => Convention::OpenCv,
@@ -274,24 +274,14 @@ impl DensityGrid {
     #[new]
     fn new(extinction: &Bound<'_, PyAny>, bounds: &Bound<'_, PyAny>) -> PyResult<Self> {
         let py = extinction.py();
-        let kwargs = PyDict::new(py);
-        kwargs.set_item("dtype", "float32")?;
-        let refuse = |what: String| {
-            let allowed = "an array of numbers of shape (nz, ny, nx), each from 1 to 2048";
-            exception(py, &Error::parameter("extinction", what, allowed))
+        let allowed = "an array of numbers of shape (nz, ny, nx), each from 1 to 2048";
+        let array = numbers_from_python("extinction", extinction, allowed, &[&[None; 3]], &["z", "y", "x"])?;
+        let allowed = "two corners of finite numbers: ((x0, y0, z0), (x1, y1, z1))";
+        let corners = numbers_from_python::<f64>("bounds", bounds, allowed, &[&[Some(2), Some(3)]], &[])?;
+        let (&[nz, ny, nx], &[x0, y0, z0, x1, y1, z1]) = (array.shape(), corners.as_slice()?) else {
+            unreachable!("the shapes are checked");
         };
-        let array = py
-            .import("numpy")?
-            .call_method("ascontiguousarray", (extinction,), Some(&kwargs))
-            .map_err(|error| refuse(error.value(py).to_string()))?;
-        let array: PyReadonlyArrayDyn<'_, f32> = array.extract()?;
-        let &[nz, ny, nx] = array.shape() else {
-            return Err(refuse(format!("an array of shape {:?}", array.shape())));
-        };
-        let [low, high] = bounds.extract::<[[f64; 3]; 2]>().map_err(|_| {
-            let given = bounds.str().map_or_else(|_| "?".into(), |text| text.to_string());
-            exception(py, &Error::parameter("bounds", given, "two corners: ((x0, y0, z0), (x1, y1, z1))"))
-        })?;
+        let (low, high) = ([x0, y0, z0], [x1, y1, z1]);
         let grid = CoreGrid::new([nx, ny, nz], array.as_slice()?.to_vec(), vector(low), vector(high));
         Ok(Self(Arc::new(raise(py, grid)?)))
     }
@@ -354,25 +344,11 @@ fn array<'py, T: numpy::Element>(py: Python<'py>, data: Vec<T>, shape: &[usize])
 
 /// World points of shape (N, 3) from any array-like.
 fn points_from_python(py: Python<'_>, points: &Bound<'_, PyAny>) -> PyResult<Vec<[f64; 3]>> {
-    let numpy = py.import("numpy")?;
     let allowed = "an array of finite numbers of shape (N, 3), world metres within 2e8 of the origin";
-    let refuse = |what: String| exception(py, &Error::parameter("points", what, allowed));
-    // Text and complex numbers could be made floats too.
-    let points = numpy.call_method1("asarray", (points,)).map_err(|error| refuse(error.value(py).to_string()))?;
-    let kind: String = points.getattr("dtype")?.getattr("kind")?.extract()?;
-    if !"fiu".contains(&kind) {
-        return Err(refuse(format!("an array of dtype {}", points.getattr("dtype")?)));
-    }
-    let points = numpy
-        .call_method1("ascontiguousarray", (points, "float64"))
-        .map_err(|error| refuse(error.value(py).to_string()))?;
-    let points: PyReadonlyArrayDyn<'_, f64> = points.extract()?;
-    if points.shape().len() != 2 || points.shape()[1] != 3 {
-        return Err(refuse(format!("an array of shape {:?}", points.shape())));
-    }
+    let points = numbers_from_python::<f64>("points", points, allowed, &[&[None, Some(3)], &[Some(0), Some(3)]], &[])?;
     let numbers = points.as_slice()?;
-    if let Some(bad) = numbers.iter().find(|v| v.is_nan() || v.abs() > 2e8) {
-        return Err(refuse(format!("an array with {bad}")));
+    if let Some(bad) = numbers.iter().find(|v| v.abs() > 2e8) {
+        return Err(exception(py, &Error::parameter("points", format!("an array with {bad}"), allowed)));
     }
     Ok(numbers.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect())
 }
@@ -648,9 +624,11 @@ fn to_srgb8<'py>(
     frame: PyReadonlyArrayDyn<'py, f32>,
     exposure: f32,
     tonemap: &Bound<'py, PyString>,
+    dither: bool,
 ) -> PyResult<Bound<'py, PyAny>> {
     let shape = frame.shape().to_vec();
-    let pixels = raise(py, color::to_srgb8(frame.as_slice()?, shape[2], exposure, &tonemap.to_string_lossy()))?;
+    let (pixels, tone_map) = (frame.as_slice()?, tonemap.to_string_lossy());
+    let pixels = raise(py, color::to_srgb8(pixels, shape[2], shape[1], exposure, &tone_map, dither))?;
     array(py, pixels, &shape)
 }
 
@@ -678,6 +656,18 @@ fn write_hdr(py: Python<'_>, path: PathBuf, frame: PyReadonlyArrayDyn<'_, f32>) 
     raise(py, files::write_hdr(&path, frame.as_slice()?, [shape[1], shape[0]], shape[2]))
 }
 
+/// Writes a file that takes the place of another when it is whole.
+#[pyfunction]
+fn write_bytes(py: Python<'_>, path: PathBuf, bytes: &[u8]) -> PyResult<()> {
+    raise(py, files::write_bytes(&path, bytes))
+}
+
+/// `FileError` where a file cannot be written.
+#[pyfunction]
+fn check_target(py: Python<'_>, path: PathBuf) -> PyResult<()> {
+    raise(py, files::check_target(&path))
+}
+
 /// The numbers in a PNG, HDR or EXR file.
 #[pyfunction]
 fn read_pixels(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyAny>> {
@@ -701,6 +691,6 @@ mod _nubis {
     #[pymodule_export]
     use super::{
         Camera, DensityGrid, Renderer, adapters, auto_exposure, cache_usage, check, check_params, check_quality,
-        clear_cache, number, quality, read_pixels, to_srgb8, write_exr, write_hdr, write_png,
+        check_target, clear_cache, number, quality, read_pixels, to_srgb8, write_bytes, write_exr, write_hdr, write_png,
     };
 }

@@ -187,14 +187,11 @@ def _sky(args: argparse.Namespace, params: nubis.Params) -> nubis.Params:
 def _targets(args: argparse.Namespace) -> list[tuple[str, Path]]:
     """Which scenes go into which files."""
     names: list[str] = list(nubis.scenes) if args.all else args.scenes
-    known = ", ".join(nubis.scenes)
     if not names:
+        known = ", ".join(nubis.scenes)
         raise nubis.ParameterError(f"no scene is given: name some of {known}, or use --all")
     for name in names:
-        if name not in nubis.scenes:
-            raise nubis.ParameterError(
-                f"SCENE = {name!r} is not allowed: it must be one of {known}"
-            )
+        nubis.scenes[name]  # raises for one that is not there
     out = Path(args.out)
     kind = out.suffix.lower()
     if args.out.endswith(("/", os.sep)) or out.is_dir() or not kind:

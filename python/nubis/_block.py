@@ -11,7 +11,8 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from nubis import _nubis
-from nubis._errors import ParameterError
+from nubis._errors import FileError, ParameterError
+from nubis._names import UnknownArgument, refuse_arguments, unknown
 from nubis._nubis import DensityGrid
 
 
@@ -19,6 +20,11 @@ class Base:
     """A frozen dataclass that compares by value, arrays included."""
 
     __dataclass_fields__: ClassVar[dict[str, dataclasses.Field[Any]]]
+
+    def __new__(cls, *_: Any, **given: Any) -> Self:
+        # Before the `__init__` of the dataclass, whose error does not say what there is.
+        refuse_arguments(cls.__name__, given, cls.__dataclass_fields__)
+        return super().__new__(cls)
 
     def replace(self, **changes: Any) -> Self:
         """Return a copy with some fields changed."""
@@ -229,6 +235,5 @@ def _grid(fields: Mapping[str, Any]) -> DensityGrid:
 
 
 def _unknown(path: str, value: Any, names: list[str]) -> ParameterError:
-    return ParameterError(
-        f"{path} = {value!r} is not allowed: there is no such field, only {', '.join(names)}"
-    )
+    words = unknown(f"{path} = {value!r}", path, names, "a field that there is, one of")
+    return ParameterError(words)

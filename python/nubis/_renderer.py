@@ -13,7 +13,8 @@ import numpy.typing as npt
 
 from nubis import _nubis
 from nubis._arrays import numbers
-from nubis._errors import ParameterError
+from nubis._errors import AdapterError, ParameterError
+from nubis._names import unknown
 from nubis._nubis import Camera
 from nubis._scene_depth import checked as checked_scene
 from nubis._shadow import ShadowMap, SunVisibility, seen_sun, world_from_map
@@ -26,6 +27,18 @@ Shot = (
     | tuple[Camera, Params, float, npt.ArrayLike | None, npt.ArrayLike | None]
 )
 Background = Literal["sky"] | None
+
+#: The names of the numerical methods.
+QUALITIES = (
+    "preview",
+    "draft",
+    "balanced",
+    "high",
+    "reference",
+    "nubis2015",
+    "thesis2018",
+    "vsu2022",
+)
 
 _warned = False
 
@@ -64,7 +77,10 @@ def quality(name: str) -> Quality:
     """
     if not isinstance(name, str):
         raise ParameterError(f"quality = {name!r} is not allowed: it must be a name or a Quality")
-    return Quality(**_nubis.quality(name))
+    try:
+        return Quality(**_nubis.quality(name))
+    except ParameterError:
+        raise ParameterError(unknown(f"quality = {name!r}", name, QUALITIES)) from None
 
 
 class Renderer:
@@ -109,7 +125,12 @@ class Renderer:
         size = _size("width", width), _size("height", height)
         _nubis.check_quality(self._quality)
         wanted = os.environ.get("NUBIS_ADAPTER") if adapter is None else str(adapter)
-        self._core = _nubis.Renderer(*size, self._quality, wanted or None)
+        try:
+            self._core = _nubis.Renderer(*size, self._quality, wanted or None)
+        except AdapterError as error:
+            if adapter is not None or not wanted:
+                raise
+            raise AdapterError(f"NUBIS_ADAPTER = {wanted!r}: {error}") from None
         self._size = size
         if not wanted:
             _warn_once(self.adapter)

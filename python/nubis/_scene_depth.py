@@ -14,6 +14,9 @@ from nubis._nubis import Camera
 
 Array = npt.NDArray[np.float32]
 
+# Farthest distance of a scene in m: beyond it is sky (crates/clouds_core/src/scene_depth.rs).
+FARTHEST = np.float32(1e10)
+
 
 class Scene(NamedTuple):
     """A checked scene: metres along each ray, radiance and cover where they are known."""
@@ -31,6 +34,8 @@ def checked(depth: Any, color: Any, size: tuple[int, int]) -> Scene | None:
         return None
     width, height = size
     depth = _numbers("scene_depth", depth, [(height, width)], finite=False)
+    if (beyond := np.isfinite(depth) & (depth > FARTHEST)).any():
+        depth = np.where(beyond, np.float32(np.inf), depth)
     if color is None:
         return None if np.isinf(depth).all() else Scene(depth, None, None)
     color = _numbers("scene_color", color, [(height, width, 3), (height, width, 4)], finite=True)

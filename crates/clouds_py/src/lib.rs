@@ -1,6 +1,7 @@
 //! `nubis._nubis`: the renderer for Python. Thin: it turns Python values into the core's and back.
 
 mod convert;
+mod exit;
 
 use std::cell::RefCell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -20,7 +21,8 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString, PyTuple};
 
 use convert::{
-    number_from_python, numbers_from_python, params_from_python, quality_from_python, value_from_python, value_to_python, vector_from_python,
+    number_from_python, numbers_from_python, params_from_python, quality_from_python, value_from_python,
+    value_to_python, vector_from_python,
 };
 
 /// The exception of the package that an error of the core becomes.
@@ -42,12 +44,24 @@ fn raise<T>(py: Python<'_>, result: Result<T>) -> PyResult<T> {
     result.map_err(|error| exception(py, &error))
 }
 
-/// Runs `work` without the GIL. It is handed a check for Ctrl-C; no panic leaves it.
+/// Runs `work` without the GIL.
+fn unlocked<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> T {
+    let _inside = exit::enter(py);
+    let result = py.detach(work);
+    exit::stay_if_closing(py);
+    result
+}
+
+/// Runs `work` without the GIL. It is handed a check for Ctrl-C and the end of the interpreter; no panic leaves it.
 fn detached<T: Send>(py: Python<'_>, work: impl FnOnce(gpu::Interrupt<'_>) -> Result<T> + Send) -> PyResult<T> {
-    let (result, interrupt) = py.detach(|| {
+    let (result, interrupt) = unlocked(py, || {
         let raised = RefCell::new(None);
         let interrupt = || {
-            Python::attach(|py| py.check_signals()).map_err(|error| {
+            if exit::is_closing() {
+                return Err(Error::Interrupted);
+            }
+            // None at the end of the interpreter.
+            Python::try_attach(|py| py.check_signals()).unwrap_or(Ok(())).map_err(|error| {
                 *raised.borrow_mut() = Some(error);
                 Error::Interrupted
             })
@@ -130,6 +144,7 @@ impl Camera {
         convention: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let py = world_from_camera.py();
+        let _inside = exit::enter(py);
         let (shape, allowed) = ([Some(4); 2], "a 4 x 4 matrix of finite numbers");
         let matrix = numbers_from_python("world_from_camera", world_from_camera, allowed, &[&shape], &[])?;
         let numbers = matrix.as_slice()?;
@@ -274,6 +289,7 @@ impl DensityGrid {
     #[new]
     fn new(extinction: &Bound<'_, PyAny>, bounds: &Bound<'_, PyAny>) -> PyResult<Self> {
         let py = extinction.py();
+        let _inside = exit::enter(py);
         let allowed = "an array of numbers of shape (nz, ny, nx), each from 1 to 2048";
         let array = numbers_from_python("extinction", extinction, allowed, &[&[None; 3]], &["z", "y", "x"])?;
         let allowed = "two corners of finite numbers: ((x0, y0, z0), (x1, y1, z1))";
@@ -403,6 +419,7 @@ impl Renderer {
         scene_depth: Option<PyReadonlyArrayDyn<'py, f32>>,
         scene_color: Option<PyReadonlyArrayDyn<'py, f32>>,
     ) -> PyResult<Bound<'py, PyAny>> {
+        let _inside = exit::enter(py);
         let params: Params = params_from_python(params)?;
         let scene = scene_from_python(scene_depth.as_ref(), scene_color.as_ref())?;
         let picture = detached(py, |interrupt| {
@@ -419,6 +436,7 @@ impl Renderer {
         time: f64,
         scene_depth: Option<PyReadonlyArrayDyn<'py, f32>>,
     ) -> PyResult<Bound<'py, PyTuple>> {
+        let _inside = exit::enter(py);
         let params: Params = params_from_python(params)?;
         let scene = scene_from_python(scene_depth.as_ref(), None)?;
         let picture =
@@ -445,6 +463,7 @@ impl Renderer {
         scene_depth: Option<PyReadonlyArrayDyn<'py, f32>>,
         scene_color: Option<PyReadonlyArrayDyn<'py, f32>>,
     ) -> PyResult<Bound<'py, PyAny>> {
+        let _inside = exit::enter(py);
         let params: Params = params_from_python(params)?;
         let scene = scene_from_python(scene_depth.as_ref(), scene_color.as_ref())?;
         let image =
@@ -453,7 +472,7 @@ impl Renderer {
     }
 
     fn cut(&self, py: Python<'_>) {
-        py.detach(|| lock(&self.core).cut());
+        unlocked(py, || lock(&self.core).cut());
     }
 
     fn history_length<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
@@ -468,6 +487,7 @@ impl Renderer {
         params: &Bound<'_, PyAny>,
         time: f64,
     ) -> PyResult<Bound<'py, PyArray1<f32>>> {
+        let _inside = exit::enter(py);
         let points = points_from_python(py, points)?;
         let params: Params = params_from_python(params)?;
         let answers = detached(py, |interrupt| lock(&self.core).density(&points, &params, time, interrupt))?;
@@ -481,6 +501,7 @@ impl Renderer {
         params: &Bound<'_, PyAny>,
         time: f64,
     ) -> PyResult<Bound<'py, PyArray1<f32>>> {
+        let _inside = exit::enter(py);
         let points = points_from_python(py, points)?;
         let params: Params = params_from_python(params)?;
         let answers = detached(py, |interrupt| lock(&self.core).sun_transmittance(&points, &params, time, interrupt))?;
@@ -495,6 +516,7 @@ impl Renderer {
         params: &Bound<'_, PyAny>,
         time: f64,
     ) -> PyResult<Bound<'py, PyArray1<f32>>> {
+        let _inside = exit::enter(py);
         let directions = points_from_python(py, directions)?;
         let params: Params = params_from_python(params)?;
         let answers = detached(py, |interrupt| {
@@ -514,6 +536,7 @@ impl Renderer {
         extent: f64,
         size: u32,
     ) -> PyResult<Bound<'py, PyAny>> {
+        let _inside = exit::enter(py);
         let params: Params = params_from_python(params)?;
         let map = detached(py, |interrupt| {
             lock(&self.core).shadow_map(&params, time, center, altitude, extent, size, interrupt)
@@ -522,6 +545,7 @@ impl Renderer {
     }
 
     fn weather_map<'py>(&self, py: Python<'py>, params: &Bound<'_, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        let _inside = exit::enter(py);
         let params: Params = params_from_python(params)?;
         let ([width, height], texels) = detached(py, |interrupt| lock(&self.core).weather_map(&params, interrupt))?;
         array(py, texels, &[height as usize, width as usize, 3])
@@ -536,6 +560,7 @@ impl Renderer {
         params: &Bound<'_, PyAny>,
         time: f64,
     ) -> PyResult<Bound<'py, PyAny>> {
+        let _inside = exit::enter(py);
         let params: Params = params_from_python(params)?;
         let answers =
             detached(py, |interrupt| lock(&self.core).probe(&imports, expression, &inputs, &params, time, interrupt))?;
@@ -544,15 +569,15 @@ impl Renderer {
     }
 
     fn timings(&self, py: Python<'_>) -> Vec<(String, f64)> {
-        py.detach(|| lock(&self.core).timings.0.clone())
+        unlocked(py, || lock(&self.core).timings.0.clone())
     }
 
     fn memory(&self, py: Python<'_>) -> Vec<(&'static str, &'static str, u64)> {
-        py.detach(|| lock(&self.core).memory())
+        unlocked(py, || lock(&self.core).memory())
     }
 
     fn adapter<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let info = py.detach(|| lock(&self.core).gpu().info.clone());
+        let info = unlocked(py, || lock(&self.core).gpu().info.clone());
         adapter_to_python(py, &info)
     }
 }
@@ -582,6 +607,7 @@ fn check<'py>(
     name: &str,
     value: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyAny>> {
+    let _inside = exit::enter(py);
     let block = params::block(type_name).expect("the classes are generated from the blocks");
     let field = block.fields().iter().find(|field| field.name == name).expect("so are their fields");
     let value = raise(py, field.check(path, &value_from_python(value)?))?;
@@ -592,11 +618,13 @@ fn check<'py>(
 #[pyfunction]
 fn check_params(params: &Bound<'_, PyAny>) -> PyResult<()> {
     let py = params.py();
+    let _inside = exit::enter(py);
     raise(py, params_from_python(params)?.check())
 }
 
 #[pyfunction]
 fn check_quality(quality: &Bound<'_, PyAny>) -> PyResult<()> {
+    let _inside = exit::enter(quality.py());
     raise(quality.py(), quality_from_python(quality)?.check())
 }
 
@@ -686,11 +714,20 @@ fn clear_cache(py: Python<'_>) -> PyResult<()> {
     raise(py, cache::clear())
 }
 
+/// What the environment should hold before the driver is loaded: name and value.
+#[pyfunction]
+fn driver_settings() -> Vec<(&'static str, &'static str)> {
+    gpu::driver_settings()
+}
+
 #[pymodule]
 mod _nubis {
     #[pymodule_export]
+    use super::exit::{close, forked};
+    #[pymodule_export]
     use super::{
         Camera, DensityGrid, Renderer, adapters, auto_exposure, cache_usage, check, check_params, check_quality,
-        check_target, clear_cache, number, quality, read_pixels, to_srgb8, write_bytes, write_exr, write_hdr, write_png,
+        check_target, clear_cache, driver_settings, number, quality, read_pixels, to_srgb8, write_bytes, write_exr,
+        write_hdr, write_png,
     };
 }

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import io
 import os
+import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Self
@@ -12,7 +14,7 @@ import numpy as np
 
 from nubis import _nubis
 from nubis._errors import FileError, ParameterError
-from nubis._names import UnknownArgument, refuse_arguments, unknown
+from nubis._names import refuse_arguments, unknown
 from nubis._nubis import DensityGrid
 
 
@@ -153,30 +155,107 @@ class Root(Base):
         return cls().with_(**changes).replace(**whole)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write all parameters to a TOML file."""
+        """Write all parameters to a TOML file.
+
+        Arrays of more than 4096 numbers are put beside it, into ``<file>.<group>.<field>.<check
+        sum>.npy``, and the file holds their names: move them together. Arrays of earlier versions
+        of the file stay there, as copies of it may name them. Each file is written under another
+        name and renamed when it is whole, and the TOML file is the last.
+
+        Raises
+        ------
+        FileError
+            When a file cannot be written.
+
+        Examples
+        --------
+        >>> params.save("sky.toml")
+        >>> nubis.Params.load("sky.toml") == params
+        True
+        """
         import tomli_w  # here, as `tomllib` below: a first picture need not wait for them
 
-        def given(fields: dict[str, Any]) -> dict[str, Any]:
-            return {name: value for name, value in fields.items() if value is not None}
+        target = Path(path)
 
-        tables = {
-            block: [given(f) for f in fields] if isinstance(fields, list) else given(fields)
-            for block, fields in self.to_dict().items()
-        }
-        _nubis.write_bytes(path, tomli_w.dumps(tables).encode())
+        def given(name: str, group: Any) -> dict[str, Any]:
+            fields = {k: v for k, v in group.to_dict().items() if v is not None}
+            for field in fields:
+                value = getattr(group, field, None)
+                if isinstance(value, np.ndarray) and value.size > _LONGEST_INSIDE:
+                    fields[field] = _write_beside(target, f"{name}.{field}", value)
+            return fields
+
+        tables: dict[str, Any] = {}
+        for field in dataclasses.fields(self):
+            group = getattr(self, field.name)
+            if field.name == "weather_mix":
+                if group:
+                    tables[field.name] = [
+                        {"weight": weight, **given(f"weather_mix{i}", weather)}
+                        for i, (weather, weight) in enumerate(group)
+                    ]
+            elif group is not None:
+                tables[field.name] = given(field.name, group)
+        _nubis.write_bytes(target, tomli_w.dumps(tables).encode())
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
-        """Read parameters from a TOML file; fields left out have their defaults."""
+        """Read parameters from a TOML file; fields left out have their defaults.
+
+        An array is nested lists, or the name of a ``.npy`` file in the folder of the TOML file.
+
+        Raises
+        ------
+        ParameterError
+            For what is no TOML file, and values that are not allowed.
+        FileError
+            When an array that is named cannot be read.
+        """
         import tomllib
 
+        source = Path(path)
         try:
-            values = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+            # Editors on Windows begin files with a mark.
+            values = tomllib.loads(source.read_bytes().decode("utf-8-sig"))
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise ParameterError(
                 f"path = {os.fspath(path)!r} is not allowed: it must be a TOML file ({error})"
             ) from error
-        return cls.from_dict(values)
+        return cls.from_dict({k: _with_arrays(source, k, v) for k, v in values.items()})
+
+
+# Numbers of an array that a person may want to read and change in a TOML file.
+_LONGEST_INSIDE = 4096
+
+
+def _write_beside(target: Path, field: str, array: np.ndarray[Any, Any]) -> str:
+    """Write an array of the file `target`; return its name, by its content."""
+    out = io.BytesIO()
+    np.save(out, array, allow_pickle=False)
+    content = out.getvalue()
+    beside = target.with_name(f"{target.name}.{field}.{zlib.crc32(content):08x}.npy")
+    _nubis.write_bytes(beside, content)
+    return beside.name
+
+
+def _with_arrays(source: Path, name: str, value: Any) -> Any:
+    """A value of the file `source`, with arrays in place of the names of their files."""
+    if isinstance(value, Mapping):
+        return {k: _with_arrays(source, f"{name}.{k}", v) for k, v in value.items()}
+    if isinstance(value, list) and value and isinstance(value[0], Mapping):
+        return [_with_arrays(source, f"{name}[{i}]", v) for i, v in enumerate(value)]
+    if not (isinstance(value, str) and value.endswith(".npy")):
+        return value
+    try:
+        array = np.load(source.parent / value, allow_pickle=False)
+    except OSError as error:
+        raise FileError(f"{name} = {value!r} cannot be read: {error}") from error
+    except (ValueError, EOFError) as error:
+        raise ParameterError(
+            f"{name} = {value!r} is not allowed: it must be a file that numpy.save has written "
+            f"({error})"
+        ) from error
+    return array
 
 
 def _mixture(value: Any) -> tuple[tuple[Block, float], ...]:

@@ -181,8 +181,8 @@ class Renderer:
             through the air, premultiplied, alpha = 1 - transmittance.
         scene_depth : array-like, shape (height, width), optional
             A scene of yours among the clouds: metres along the ray of each pixel, not along the
-            axis of the camera (`distance_from_z`); inf where there is nothing. Only what lies in
-            front of it is seen. It hides the plain ground too, and casts no shadow. Without
+            axis of the camera (`distance_from_z`); inf, or any number above 1e10, where there is
+            nothing. Only what lies in front of it is seen. It hides the plain ground too, and casts no shadow. Without
             `scene_color`, and with the sky, its pixels hold the clouds and the air in front of it,
             premultiplied, with alpha below 1: ``frame + (1 - alpha) * yours`` is the picture, in
             which alpha has the luminance of the air's transmittance.
@@ -461,7 +461,7 @@ class Renderer:
         time : float
             Seconds.
         scene_depth : array-like, shape (height, width), optional
-            As for `render`: where it is finite, it hides the sun.
+            As for `render`: where it is at most 1e10, it hides the sun.
 
         Returns
         -------

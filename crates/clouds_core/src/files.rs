@@ -200,3 +200,27 @@ fn read_exr(file: BufReader<File>) -> Result<Pixels, String> {
     }
     Ok(Pixels { size: [width, height], channels: chosen.len(), data })
 }
+
+/// Reads an array of float32 as `numpy.save` writes it (NEP 1): its shape, and its numbers with the last axis fastest.
+pub fn read_npy(path: &Path) -> Result<(Vec<usize>, Vec<f32>)> {
+    let bytes = fs::read(path).map_err(|error| failed(path, error))?;
+    npy_from(&bytes).ok_or_else(|| failed(path, "it is no .npy file of float32 in C order"))
+}
+
+fn npy_from(bytes: &[u8]) -> Option<(Vec<usize>, Vec<f32>)> {
+    let version = *bytes.strip_prefix(b"\x93NUMPY")?.first()?;
+    // The length of the header has two bytes in the first version, four in the others.
+    let start = if version == 1 { 10 } else { 12 };
+    let length = bytes.get(8..start)?.iter().rev().fold(0, |length, byte| length << 8 | usize::from(*byte));
+    let header = std::str::from_utf8(bytes.get(start..start.checked_add(length)?)?).ok()?;
+    if !header.contains("'descr': '<f4'") || !header.contains("'fortran_order': False") {
+        return None;
+    }
+    let (_, shape) = header.split_once("'shape': (")?;
+    let sides = shape.split_once(')')?.0.split(',').map(str::trim).filter(|side| !side.is_empty());
+    let shape: Vec<usize> = sides.map(|side| side.parse().ok()).collect::<Option<_>>()?;
+    let count = shape.iter().try_fold(4usize, |count, side| count.checked_mul(*side))?;
+    let data = bytes.get(start + length..).filter(|data| data.len() == count)?;
+    let numbers = data.chunks_exact(4).map(|v| f32::from_le_bytes([v[0], v[1], v[2], v[3]])).collect();
+    Some((shape, numbers))
+}

@@ -70,7 +70,8 @@ impl SceneTextures {
     /// Uploads some of its pixels.
     pub fn upload(&self, gpu: &Gpu, scene: &SceneDepth<'_>, pixels: Range<usize>) {
         let texels = |texture: &wgpu::Texture| texture.width() as usize * texture.height() as usize;
-        let mut distance: Vec<f32> = scene.distance[pixels.clone()].iter().map(|v| if *v > FARTHEST { NO_SCENE } else { *v }).collect();
+        let mut distance: Vec<f32> =
+            scene.distance[pixels.clone()].iter().map(|v| if *v > FARTHEST { NO_SCENE } else { *v }).collect();
         distance.resize(texels(&self.depth), NO_SCENE);
         gpu.write_texture(&self.depth, &distance);
         if let Some(color) = scene.color {

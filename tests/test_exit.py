@@ -104,7 +104,8 @@ def test_no_word_without_a_screen(folder):
 
 
 @pytest.mark.parametrize(
-    "given", [{"NODEVICE_SELECT": "0"}, {"MESA_VK_DEVICE_SELECT": "list"}, {"XDG_RUNTIME_DIR": "/tmp"}]
+    "given",
+    [{"NODEVICE_SELECT": "0"}, {"MESA_VK_DEVICE_SELECT": "list"}, {"XDG_RUNTIME_DIR": "/tmp"}],
 )
 def test_what_the_user_says_of_the_driver_stays(given):
     unset = {"NODEVICE_SELECT": None, "XDG_RUNTIME_DIR": None, "MESA_VK_DEVICE_SELECT": None}

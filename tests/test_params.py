@@ -434,7 +434,7 @@ def test_named_methods_can_be_changed():
 
 
 def test_files_with_a_byte_order_mark(tmp_path):
-    text = '[clouds]\ncoverage = 0.25\n'
+    text = "[clouds]\ncoverage = 0.25\n"
     for name, encoding in [("plain", "utf-8"), ("marked", "utf-8-sig")]:
         path = tmp_path / f"{name}.toml"
         path.write_text(text, encoding=encoding)

@@ -19,7 +19,7 @@ from nubis._errors import ParameterError
 Shape = tuple[int | None, ...]
 
 
-class Unfit(ValueError):
+class UnfitError(ValueError):
     """A value that is no array of numbers. The message is the value in the words of an error."""
 
 
@@ -37,25 +37,27 @@ def opened(value: Any, dims: Sequence[str] = (), kinds: str = "fiu") -> npt.NDAr
 
     Raises
     ------
-    Unfit
+    UnfitError
         For masked values, axes without a known name, sparse and ragged arrays, numbers with a unit,
         and other dtypes.
     """
     hidden = sum(_masked(value))
     if hidden:
-        raise Unfit(f"masked array with {hidden} masked values (array.filled(...) replaces them)")
+        raise UnfitError(
+            f"masked array with {hidden} masked values (array.filled(...) replaces them)"
+        )
     if type(value).__name__ == "Quantity":
-        raise Unfit("quantity with a unit (give its numbers alone, in the unit named here)")
+        raise UnfitError("quantity with a unit (give its numbers alone, in the unit named here)")
     if hasattr(value, "toarray") or hasattr(value, "todense"):
-        raise Unfit(f"sparse {type(value).__name__} (its todense() is an array)")
+        raise UnfitError(f"sparse {type(value).__name__} (its todense() is an array)")
     if isinstance(getattr(value, "dims", None), tuple) and hasattr(value, "transpose"):
         value = _by_dims(value, tuple(dims))
     try:
         array = np.asarray(value)
     except Exception as error:  # whatever a class of its own raises
-        raise Unfit(f"{type(value).__name__} that is no array ({error})") from None
+        raise UnfitError(f"{type(value).__name__} that is no array ({error})") from None
     if array.dtype.kind not in kinds:
-        raise Unfit(f"array of shape {array.shape} and dtype {array.dtype}")
+        raise UnfitError(f"array of shape {array.shape} and dtype {array.dtype}")
     return array
 
 
@@ -90,7 +92,7 @@ def numbers(
     """
     try:
         array = opened(value, dims)
-    except Unfit as error:
+    except UnfitError as error:
         raise _refused(name, str(error), allowed) from None
     if not any(_fits(array.shape, shape) for shape in shapes):
         raise _refused(name, f"array of shape {array.shape}", allowed)
@@ -127,7 +129,7 @@ def _fits(shape: tuple[int, ...], wanted: Shape) -> bool:
 def _masked(value: Any) -> Iterator[int]:
     """How many values are masked, in an array or in those of a nested list."""
     if isinstance(value, np.ma.MaskedArray):
-        yield int(np.ma.count_masked(value))
+        yield int(np.count_nonzero(np.ma.getmaskarray(value)))
     elif isinstance(value, list | tuple):
         for part in value:
             if not isinstance(part, float | int):
@@ -142,7 +144,9 @@ def _by_dims(value: Any, dims: tuple[str, ...]) -> Any:
     rest = [name for name in given if name not in dims]
     if not dims or not set(dims) <= set(given) or len(rest) > 1:
         wanted = f"name them {', '.join(dims)}, or " if dims else ""
-        raise Unfit(f"DataArray with dims {given} ({wanted}give its .values in the right order)")
+        raise UnfitError(
+            f"DataArray with dims {given} ({wanted}give its .values in the right order)"
+        )
     for name in dims:
         _check_ascending(name, value, upward=len(dims) == 3)
     with contextlib.suppress(AttributeError):
@@ -157,4 +161,6 @@ def _check_ascending(name: str, value: Any, *, upward: bool) -> None:
         return
     along = np.asarray(coords[name])
     if along.dtype.kind in "fiu" and along.size > 1 and not (np.diff(along) > 0).all():
-        raise Unfit(f"DataArray whose {name} does not ascend (sortby({name!r}) puts it in order)")
+        raise UnfitError(
+            f"DataArray whose {name} does not ascend (sortby({name!r}) puts it in order)"
+        )

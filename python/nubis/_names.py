@@ -11,13 +11,13 @@ from nubis._errors import ParameterError
 Value = TypeVar("Value")
 
 
-class UnknownKey(ParameterError, KeyError):
+class UnknownKeyError(ParameterError, KeyError):
     """A name that a table of the package does not have."""
 
     __str__ = Exception.__str__  # KeyError's is a repr
 
 
-class UnknownArgument(ParameterError, TypeError):
+class UnknownArgumentError(ParameterError, TypeError):
     """A keyword that a class of parameters does not take."""
 
 
@@ -40,7 +40,7 @@ class Named(Mapping[str, Value]):
             return self._values[name]
         except (KeyError, TypeError):
             pass
-        raise UnknownKey(unknown(f"{self._kind} = {name!r}", str(name), self._values))
+        raise UnknownKeyError(unknown(f"{self._kind} = {name!r}", str(name), self._values))
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._values)
@@ -64,4 +64,4 @@ def refuse_arguments(kind: str, given: Iterable[str], names: Iterable[str]) -> N
     for name in given:
         if name not in known:
             words = unknown(f"{kind}({name}=...)", name, known, "a field, one of")
-            raise UnknownArgument(words)
+            raise UnknownArgumentError(words)

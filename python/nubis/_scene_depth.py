@@ -55,9 +55,7 @@ def checked(depth: Any, color: Any, size: tuple[int, int]) -> Scene | None:
     return Scene(depth, whole, None if (cover[there] == 1).all() else cover)
 
 
-def _numbers(
-    name: str, value: Any, shapes: list[tuple[int | None, ...]], *, finite: bool
-) -> Array:
+def _numbers(name: str, value: Any, shapes: list[tuple[int | None, ...]], *, finite: bool) -> Array:
     shown = " or ".join(str(shape).replace("None", "N") for shape in shapes)
     rule = "finite and not negative" if finite else "0 m to infinity"
     allowed = f"an array of numbers of shape {shown}, {rule}"

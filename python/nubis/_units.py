@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from nubis._arrays import Unfit, opened
+from nubis._arrays import UnfitError, opened
 from nubis._errors import ParameterError
 
 #: Shares of red, green and blue in the luminance, for Rec. 709 primaries (ITU-R BT.709).
@@ -45,13 +45,12 @@ def luminance(frame: npt.ArrayLike) -> npt.NDArray[np.float32]:
     """
     try:
         pixels = opened(frame)
-    except Unfit as error:
+    except UnfitError as error:
         raise ParameterError(f"frame = {error} is not allowed: it must be an array") from None
     if pixels.ndim < 1 or pixels.shape[-1] not in (3, 4):
         raise ParameterError(
             f"frame of shape {pixels.shape} is not allowed: it must be (..., 3) or (..., 4)"
         )
-    values: npt.NDArray[np.float32] = (LUMINOUS_EFFICACY * (pixels[..., :3].astype(np.float64) @ LUMINANCE)).astype(
-        np.float32
-    )
+    weighted = LUMINOUS_EFFICACY * (pixels[..., :3].astype(np.float64) @ LUMINANCE)
+    values: npt.NDArray[np.float32] = weighted.astype(np.float32)
     return values

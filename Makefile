@@ -126,8 +126,8 @@ soak: build $(VENV)/bench ## Render 10 000 animated frames and look for drift an
 # The sdist is built where nothing else of the project is; what it has in common with the tree is compiled once.
 packages: build ## Build wheel and sdist into dist/, and try both in empty environments
 	rm -rf dist
-	$(BIN)/maturin sdist --quiet --out dist
-	$(BIN)/maturin build --quiet --release --out dist
+	$(BIN)/maturin sdist --out dist
+	$(BIN)/maturin build --release --out dist
 	@set -euo pipefail; \
 	place=$$(mktemp -d); trap 'rm -rf "$$place"' EXIT; dist=$$PWD/dist; \
 	export CARGO_TARGET_DIR=$$PWD/target; \

@@ -184,8 +184,8 @@ class Renderer:
             axis of the camera (`distance_from_z`); inf, or any number above 1e10, where there is
             nothing. Only what lies in front of it is seen. It hides the plain ground too, and casts
             no shadow. Without `scene_color`, and with the sky, its pixels hold the clouds and the
-            air in front of it, premultiplied, with alpha below 1: ``frame + (1 - alpha) * yours`` is the picture, in
-            which alpha has the luminance of the air's transmittance.
+            air in front of it, premultiplied, with alpha below 1: ``frame + (1 - alpha) * yours``
+            is the picture, in which alpha has the luminance of the air's transmittance.
         scene_color : array-like, shape (height, width, 3) or (height, width, 4), optional
             Linear radiance of that scene, seen through air and clouds with each colour dimmed in
             its own way. A fourth number is how much of the pixel the scene covers, 0 to 1, and the

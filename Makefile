@@ -123,11 +123,13 @@ soak: build $(VENV)/bench ## Render 10 000 animated frames and look for drift an
 	$(BIN)/python -m benchmarks.soak
 	$(BIN)/python -m benchmarks --plots-only
 
-# The sdist is built where nothing else of the project is; what it has in common with the tree is compiled once.
+# The sdist is built where nothing else of the project is. Its dependencies are those of the tree and compiled once; its own
+# crates are cleaned first, as cargo would take them for those of the tree, by their names, and build nothing.
 packages: build ## Build wheel and sdist into dist/, and try both in empty environments
 	rm -rf dist
 	$(BIN)/maturin sdist --out dist
 	$(BIN)/maturin build --release --out dist
+	cargo clean --release --quiet -p clouds_core -p clouds_py
 	@set -euo pipefail; \
 	place=$$(mktemp -d); trap 'rm -rf "$$place"' EXIT; dist=$$PWD/dist; \
 	export CARGO_TARGET_DIR=$$PWD/target; \

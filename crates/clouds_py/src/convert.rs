@@ -108,7 +108,7 @@ pub fn numbers_from_python<'py, T: numpy::Element>(
     kwargs.set_item("dims", dims)?;
     kwargs.set_item("dtype", T::get_dtype(py))?;
     let gate = py.import("nubis._arrays")?.getattr("numbers")?;
-    Ok(gate.call((name, value, allowed), Some(&kwargs))?.extract()?)
+    gate.call((name, value, allowed), Some(&kwargs))?.extract()
 }
 
 /// A vector, or a map; what it is instead where it is neither.
@@ -123,7 +123,7 @@ fn array_from_python(value: &Bound<'_, PyAny>) -> Result<Value, String> {
     let channels = match shape[..] {
         [_] => {
             let numbers: PyReadonlyArrayDyn<'_, f64> =
-                read("float64").and_then(|array| Ok(array.extract()?)).map_err(failed)?;
+                read("float64").and_then(|array| array.extract()).map_err(failed)?;
             return Ok(Value::Vector(numbers.as_slice().map_err(|error| error.to_string())?.to_vec()));
         }
         [_, _] => 1,

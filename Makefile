@@ -12,7 +12,7 @@ export VIRTUAL_ENV := $(CURDIR)/$(VENV)
 unexport CONDA_PREFIX
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help setup build generate render gallery steps demo window test stress types lint bench bench-kernels heat profile soak clean
+.PHONY: help setup build generate render gallery steps demo window test stress types lint bench bench-kernels heat profile soak packages clean
 
 help: ## List the commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -123,5 +123,25 @@ soak: build $(VENV)/bench ## Render 10 000 animated frames and look for drift an
 	$(BIN)/python -m benchmarks.soak
 	$(BIN)/python -m benchmarks --plots-only
 
+# The sdist is built where nothing else of the project is. Its dependencies are those of the tree and compiled once; its own
+# crates are cleaned first, as cargo would take them for those of the tree, by their names, and build nothing.
+packages: build ## Build wheel and sdist into dist/, and try both in empty environments
+	rm -rf dist
+	$(BIN)/maturin sdist --out dist
+	$(BIN)/maturin build --release --out dist
+	cargo clean --release --quiet -p clouds_core -p clouds_py
+	@set -euo pipefail; \
+	place=$$(mktemp -d); trap 'rm -rf "$$place"' EXIT; dist=$$PWD/dist; \
+	export CARGO_TARGET_DIR=$$PWD/target; \
+	for package in "$$dist"/*.whl "$$dist"/*.tar.gz; do \
+	    env -u VIRTUAL_ENV $(PYTHON) -m venv "$$place/venv"; \
+	    (cd "$$place" && env -u VIRTUAL_ENV venv/bin/python -m pip install --quiet "$$package" && \
+	    NUBIS_ADAPTER=$${NUBIS_ADAPTER:-cpu} NUBIS_CACHE=off venv/bin/python -c 'import nubis; \
+	frame = nubis.Renderer(16, 9, quality="draft").render(*nubis.scenes["fair_weather"]); \
+	assert frame.shape == (9, 16, 4) and frame[..., :3].max() > 0'); \
+	    rm -rf "$$place/venv"; \
+	    du -h "$$package" | sed "s|$$PWD/||"; \
+	done
+
 clean: ## Remove everything that was made
-	rm -rf target $(VENV) out python/nubis/*.so
+	rm -rf target $(VENV) out dist python/nubis/*.so

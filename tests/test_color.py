@@ -50,7 +50,7 @@ def test_agx(colours):
     to that.
     """
     for picture in (np.repeat(RAMP, 3).reshape(1, -1, 3), colours):
-        error = to_srgb8(picture, tonemap="agx") - 255 * agx(picture)
+        error = to_srgb8(picture, tonemap="agx", dither=False) - 255 * agx(picture)
         assert np.abs(error).max() < 2.5
         assert np.sqrt((error**2).mean()) < 0.9
 
@@ -108,7 +108,7 @@ def test_aces_greys():
     """
     linear = np.clip((c9(c5(RAMP)) - 0.02) / (48 - 0.02), 0, 1) ** 0.9811
     expected = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-    got = to_srgb8(np.repeat(RAMP, 3).reshape(1, -1, 3), tonemap="aces")[0, :, 1]
+    got = to_srgb8(np.repeat(RAMP, 3).reshape(1, -1, 3), tonemap="aces", dither=False)[0, :, 1]
     error = got - 255 * expected
     assert np.abs(error).max() < 2.5
     assert np.sqrt((error**2).mean()) < 1
@@ -126,7 +126,7 @@ def test_aces_is_the_published_fit(colours):
     v = (v * (v + 0.0245786) - 0.000090537) / (v * (0.983729 * v + 0.4329510) + 0.238081)
     v = np.clip(v @ np.transpose(out), 0, 1)
     expected = 255 * np.where(v <= 0.0031308, 12.92 * v, 1.055 * v ** (1 / 2.4) - 0.055)
-    np.testing.assert_allclose(to_srgb8(colours, tonemap="aces"), expected, atol=0.52)
+    np.testing.assert_allclose(to_srgb8(colours, tonemap="aces", dither=False), expected, atol=0.52)
 
 
 def grey(values):

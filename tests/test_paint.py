@@ -191,15 +191,15 @@ GOOD = {"map": empty((4, 4)), "at": (0, 0), "radius": 100.0, "extent": EXTENT}
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"map": empty((4, 4))[0]}, "map of shape (4, 3)"),
-        ({"map": empty((4, 4), 1.5)}, "map with 1.5"),
-        ({"map": empty((4, 4), np.nan)}, "map with nan"),
-        ({"map": "map.png"}, "map of <U7"),
-        ({"map": [[0, 1], [1]]}, "map is not allowed"),
-        ({"at": (0, 0, 0)}, "at of shape (1, 3)"),
-        ({"at": np.zeros((0, 2))}, "at of shape (0, 2)"),
-        ({"at": (0, np.inf)}, "at with inf"),
-        ({"at": (0, 1e8)}, "at with 100000000.0"),
+        ({"map": empty((4, 4))[0]}, "map = array of shape (4, 3)"),
+        ({"map": empty((4, 4), 1.5)}, "map[0, 0, 0] = 1.5"),
+        ({"map": empty((4, 4), np.nan)}, "map[0, 0, 0] = nan"),
+        ({"map": "map.png"}, "map = array of shape () and dtype <U7"),
+        ({"map": [[0, 1], [1]]}, "map = list that is no array"),
+        ({"at": (0, 0, 0)}, "at = array of shape (3,)"),
+        ({"at": np.zeros((0, 2))}, "at = array of shape (0, 2)"),
+        ({"at": (0, np.inf)}, "at[1] = inf"),
+        ({"at": (0, 1e8)}, "at[1] = 100000000.0"),
         ({"radius": 0.0}, "radius = 0.0"),
         ({"radius": EXTENT + 1}, "radius = 20001.0"),
         ({"radius": np.nan}, "radius = nan"),
@@ -222,11 +222,11 @@ def test_what_cannot_be_painted(changes, words):
 @pytest.mark.parametrize(
     ("mask", "words"),
     [
-        (np.zeros((4, 5)), "mask of shape (4, 5)"),
-        (np.zeros((4, 4, 1)), "mask of shape (4, 4, 1)"),
-        (np.full((4, 4), 2.0), "mask with 2.0"),
-        (np.full((4, 4), np.nan), "mask with nan"),
-        (np.zeros((4, 4), bool), "mask of bool"),
+        (np.zeros((4, 5)), "mask = array of shape (4, 5)"),
+        (np.zeros((4, 4, 1)), "mask = array of shape (4, 4, 1)"),
+        (np.full((4, 4), 2.0), "mask[0, 0] = 2.0"),
+        (np.full((4, 4), np.nan), "mask[0, 0] = nan"),
+        (np.zeros((4, 4), bool), "mask = array of shape (4, 4) and dtype bool"),
     ],
 )
 def test_what_is_no_mask(mask, words):

@@ -8,6 +8,7 @@ import functools
 import math
 import pickle
 import re
+import shutil
 import typing
 
 import numpy as np
@@ -430,3 +431,60 @@ def test_named_methods_can_be_changed():
     assert draft.replace(steps_zenith=7).steps_zenith == 7
     with pytest.raises(ParameterError, match="draft"):
         nubis.quality("no such method")
+
+
+def test_files_with_a_byte_order_mark(tmp_path):
+    text = "[clouds]\ncoverage = 0.25\n"
+    for name, encoding in [("plain", "utf-8"), ("marked", "utf-8-sig")]:
+        path = tmp_path / f"{name}.toml"
+        path.write_text(text, encoding=encoding)
+        assert nubis.Params.load(path).clouds.coverage == 0.25
+
+
+def test_large_arrays_lie_beside_the_file(tmp_path, rng):
+    def big(*shape):
+        return rng.random(shape).astype(np.float32)
+
+    weather = nubis.Weather(map=big(128, 130, 3), broad_map=big(2, 3, 3))
+    params = nubis.Params(
+        clouds=nubis.Clouds(profile=big(80, 90)),
+        weather=weather,
+        weather_mix=((weather.replace(map=big(128, 130, 3)), 0.25),),
+        volume=nubis.DensityGrid(big(20, 30, 40), ((0, 0, 0), (1, 2, 3))),
+    )
+    path = tmp_path / "sky.toml"
+    params.save(path)
+    assert nubis.Params.load(path) == params
+    assert path.stat().st_size < 100_000
+    # Small ones can be read and changed.
+    assert "broad_map = [" in path.read_text()
+    beside = sorted(p.name for p in tmp_path.iterdir() if p != path)
+    assert len(beside) == 4 and all(re.fullmatch(r"sky\.toml\..*\.npy", p) for p in beside)
+    # Elsewhere together, and a copy that a later save of the other leaves whole.
+    there = tmp_path / "there"
+    shutil.copytree(tmp_path, there)
+    assert nubis.Params.load(there / "sky.toml") == params
+    shutil.copy(path, tmp_path / "copy.toml")
+    params.with_(**{"weather.map": big(128, 130, 3)}).save(path)
+    assert nubis.Params.load(tmp_path / "copy.toml") == params != nubis.Params.load(path)
+
+
+def test_arrays_inside_the_file_are_still_read(tmp_path, rng):
+    weather = nubis.Weather(map=rng.random((60, 60, 3)))
+    params = nubis.Params(weather=weather)
+    import tomli_w
+
+    tables = params.to_dict()
+    tables = {g: {k: v for k, v in f.items() if v is not None} for g, f in tables.items()}
+    (tmp_path / "old.toml").write_text(tomli_w.dumps(tables))
+    assert nubis.Params.load(tmp_path / "old.toml") == params
+
+
+def test_arrays_that_are_not_there(tmp_path):
+    path = tmp_path / "sky.toml"
+    path.write_text('[weather]\nmap = "gone.npy"\n')
+    with pytest.raises(nubis.FileError, match=r"weather.map = 'gone.npy'.*gone.npy"):
+        nubis.Params.load(path)
+    (tmp_path / "gone.npy").write_bytes(b"nothing")
+    with pytest.raises(nubis.ParameterError, match=r"weather.map = 'gone.npy'"):
+        nubis.Params.load(path)

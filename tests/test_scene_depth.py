@@ -397,3 +397,18 @@ def test_colour_needs_the_sky(renderer):
         renderer(*SIZE).render(
             CAMERA, nubis.Params(), background=None, scene_depth=depth, scene_color=color
         )
+
+
+@pytest.mark.parametrize("far", [1.001e10, 9e29, 1e30, 3e38, np.inf])
+def test_what_is_beyond_all_skies_is_sky(renderer, far):
+    """As inf: 1e10 m is the farthest that a scene is, whatever number the sky has elsewhere."""
+    camera = nubis.Camera.look_at((0, 0, 100), (0, 1000, 300))
+    maker, params = renderer(16, 9), nubis.Params()
+    depth, colour = np.full((9, 16), np.inf), np.ones((9, 16, 3))
+    depth[:, 8:] = 500.0
+    sky = maker.render(camera, params, scene_depth=depth, scene_color=colour)
+    depth[:, :8] = far
+    got = maker.render(camera, params, scene_depth=depth, scene_color=colour)
+    np.testing.assert_array_equal(got, sky)
+    depth[:, :8] = 1e10
+    assert (maker.render(camera, params, scene_depth=depth) != sky).any()

@@ -113,3 +113,45 @@ def test_a_volume_replaces_the_clouds_and_stays_where_it_is(renderer):
     assert (make.render(camera, params.replace(volume=None)) != still).any()
     empty = make.render_layers(camera, sky(DensityGrid(0 * ball(), BOX)))
     assert (empty["transmittance"] == 1).all() and (empty["radiance"] == 0).all()
+
+
+EMPTY = DensityGrid(np.zeros((2, 2, 2)), BOX)
+HIGH = {
+    "high_clouds.coverage": 1.0,
+    "high_clouds.altitude": 2000.0,
+    "high_clouds.optical_depth": 3.0,
+    "atmosphere.enabled": False,
+}
+UP = nubis.Camera.look_at((0, 0, 100), (0, 1000, 900))
+
+
+@pytest.mark.parametrize("quality", ["draft", "reference"])
+@pytest.mark.parametrize("model", ["nubis2015", "path"])
+def test_a_grid_is_all_the_cloud_there_is(renderer, quality, model):
+    """An empty one leaves the picture of a clear sky, whatever the defaults, unless high clouds are
+    asked for; then they are those of a sky without a grid.
+    """
+    maker = renderer(16, 9, quality)
+    base = nubis.Params().with_(**HIGH, **{"light.model": model, "clouds.coverage": 0.0})
+    points = np.array([[0.0, 0.0, 0.0], [2000.0, 100.0, 1000.0]])
+
+    def answers(params):
+        layers = maker.render_layers(UP, params)
+        return {
+            "picture": maker.render(UP, params),
+            "frame": next(maker.animate([(UP, params, 0.0)])),
+            "transmittance": layers["transmittance"],
+            "sun": maker.sun_transmittance(points, params),
+            "map": maker.shadow_map(params, size=4).transmittance,
+            "seen": np.array(maker.sun_visibility(UP, params)),
+        }
+
+    clear = answers(base.with_(**{"high_clouds.coverage": 0.0}))
+    assert (clear["transmittance"] == 1).all() and (clear["sun"] == 1).all()
+    for name, value in answers(base.replace(volume=EMPTY)).items():
+        np.testing.assert_array_equal(value, clear[name], err_msg=name)
+    high = answers(base)
+    assert high["transmittance"].min() < 0.9 and high["sun"].min() < 0.9
+    wished = answers(base.with_(**{"high_clouds.with_volume": True}).replace(volume=EMPTY))
+    for name, value in wished.items():
+        np.testing.assert_allclose(value, high[name], rtol=0.02, atol=0.005, err_msg=name)

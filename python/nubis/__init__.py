@@ -10,6 +10,10 @@ World: right-handed metres, x east, y north, z up, z = 0 at sea level under the 
 degrees, time is seconds. Frames are float32, scene-linear, with Rec. 709 primaries.
 """
 
+import atexit as _atexit
+import os as _os
+
+from nubis import _nubis
 from nubis._errors import (
     AdapterError,
     DeviceError,
@@ -44,6 +48,13 @@ from nubis.params import (
     Weather,
     Wind,
 )
+
+# Here, where a program is about to start threads and has loaded no driver.
+_os.environ.update(_nubis.driver_settings())
+# Daemon threads that render meet the end of the interpreter: crates/clouds_py/src/exit.rs.
+_atexit.register(_nubis.close)
+if hasattr(_os, "register_at_fork"):
+    _os.register_at_fork(after_in_child=_nubis.forked)
 
 __version__ = "0.1.0"
 

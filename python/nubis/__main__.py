@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 import warnings
 from collections.abc import Iterable, Sequence
@@ -16,7 +17,7 @@ import numpy as np
 import nubis
 from nubis import _image, _nubis
 
-_FORMATS = ("png", "exr", "hdr", "npy")
+_FORMATS = tuple(ending[1:] for ending in _image.ENDINGS)
 
 _EXAMPLES = """\
 examples:
@@ -51,15 +52,14 @@ def _parser() -> argparse.ArgumentParser:
     render.add_argument("--all", action="store_true", help="render every scene")
     render.add_argument(
         "--out",
-        type=Path,
-        default=Path("out"),
+        default="out",
         metavar="DIR|FILE",
-        help="folder, or file of one scene ending in .png .exr .hdr or .npy (default: out)",
+        help="folder, or file of one scene ending in .png .exr .hdr or .npy (default: out); a new "
+        "folder with a dot in its name ends in /",
     )
     render.add_argument(
         "--format",
         choices=_FORMATS,
-        default="png",
         help="of files in a folder: png is tone-mapped, the others are linear (default: png)",
     )
     render.add_argument(
@@ -97,6 +97,12 @@ def _parser() -> argparse.ArgumentParser:
     )
     render.add_argument(
         "--cover", type=float, metavar="C", help="how much cloud, from 0, clear, to 1, overcast"
+    )
+    render.add_argument(
+        "--no-dither",
+        dest="dither",
+        action="store_false",
+        help="round each number of a png to the nearest step, without noise against bands",
     )
     render.add_argument(
         "--heat",
@@ -145,6 +151,10 @@ def _size(text: str) -> tuple[int, int]:
 def _render(args: argparse.Namespace) -> None:
     targets = _targets(args)
     skies = {name: _sky(args, nubis.scenes[name][1]) for name, _ in targets}
+    for _, path in targets:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        for file in (path, _heat_path(path)) if args.heat else (path,):
+            _image.check_target(file)
     renderer = nubis.Renderer(*args.size, quality=args.quality, adapter=args.adapter)
     print(_line(renderer.adapter), flush=True)
     width, height = renderer.size
@@ -155,12 +165,11 @@ def _render(args: argparse.Namespace) -> None:
             started = perf_counter()
             frame = renderer.render(camera, params, time=args.time)
             milliseconds = 1000 * (perf_counter() - started)
-            path.parent.mkdir(parents=True, exist_ok=True)
-            nubis.save(path, frame, exposure=args.exposure)
+            nubis.save(path, frame, exposure=args.exposure, dither=args.dither)
             say(f"{path}: {renderer.adapter.name}, {width}x{height}, {milliseconds:.0f} ms")
             if args.heat:
                 layers = renderer.render_layers(camera, params, time=args.time)
-                beside = path.with_suffix(".heat.png")
+                beside = _heat_path(path)
                 _nubis.write_png(beside, _image.heat(layers["samples"]))
                 say(f"{beside}: {layers['samples'].mean():.1f} density evaluations a pixel")
             sys.stdout.flush()
@@ -178,22 +187,34 @@ def _sky(args: argparse.Namespace, params: nubis.Params) -> nubis.Params:
 def _targets(args: argparse.Namespace) -> list[tuple[str, Path]]:
     """Which scenes go into which files."""
     names: list[str] = list(nubis.scenes) if args.all else args.scenes
-    known = ", ".join(nubis.scenes)
     if not names:
+        known = ", ".join(nubis.scenes)
         raise nubis.ParameterError(f"no scene is given: name some of {known}, or use --all")
     for name in names:
-        if name not in nubis.scenes:
-            raise nubis.ParameterError(
-                f"SCENE = {name!r} is not allowed: it must be one of {known}"
-            )
-    out: Path = args.out
-    if out.suffix.lstrip(".").lower() not in _FORMATS:
-        return [(name, out / f"{name}.{args.format}") for name in names]
+        nubis.scenes[name]  # raises for one that is not there
+    out = Path(args.out)
+    kind = out.suffix.lower()
+    if args.out.endswith(("/", os.sep)) or out.is_dir() or not kind:
+        return [(name, out / f"{name}.{args.format or 'png'}") for name in names]
+    if kind not in _image.ENDINGS:
+        raise nubis.ParameterError(
+            f"--out = {args.out!r} is not allowed: a file must end in {' '.join(_image.ENDINGS)}, "
+            "and a new folder whose name has a dot in /"
+        )
+    if args.format and kind != f".{args.format}":
+        raise nubis.ParameterError(
+            f"--format = {args.format!r} is not allowed: it must be that of --out, {kind[1:]}, or "
+            "left out"
+        )
     if len(names) > 1:
         raise nubis.ParameterError(
-            f"--out = {str(out)!r} is not allowed: it must be a folder for more than one scene"
+            f"--out = {args.out!r} is not allowed: it must be a folder for more than one scene"
         )
     return [(names[0], out)]
+
+
+def _heat_path(path: Path) -> Path:
+    return path.with_suffix(".heat.png")
 
 
 def _progress(

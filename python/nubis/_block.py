@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import io
 import math
 import os
+import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Self
@@ -12,7 +14,8 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from nubis import _nubis
-from nubis._errors import ParameterError
+from nubis._errors import FileError, ParameterError
+from nubis._names import refuse_arguments, unknown
 from nubis._nubis import DensityGrid
 
 
@@ -20,6 +23,11 @@ class Base:
     """A frozen dataclass that compares by value, arrays included."""
 
     __dataclass_fields__: ClassVar[dict[str, dataclasses.Field[Any]]]
+
+    def __new__(cls, *_: Any, **given: Any) -> Self:
+        # Before the `__init__` of the dataclass, whose error does not say what there is.
+        refuse_arguments(cls.__name__, given, cls.__dataclass_fields__)
+        return super().__new__(cls)
 
     def replace(self, **changes: Any) -> Self:
         """Return a copy with some fields changed."""
@@ -178,40 +186,112 @@ class Root(Base):
                 whole[block] = _grid(fields)
                 continue
             for name, value in fields.items():
-                changes[f"{block}.{name}"] = _plain(block, name, value)
+                changes[f"{block}.{name}"] = value
         # Last, since a mixture must fit the weather that it goes with.
         return cls().with_(**changes).replace(**whole)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write all parameters to a TOML file."""
+        """Write all parameters to a TOML file.
+
+        Arrays of more than 4096 numbers are put beside it, into ``<file>.<group>.<field>.<check
+        sum>.npy``, and the file holds their names: move them together. Arrays of earlier versions
+        of the file stay there, as copies of it may name them. Each file is written under another
+        name and renamed when it is whole, and the TOML file is the last.
+
+        Raises
+        ------
+        FileError
+            When a file cannot be written.
+
+        Examples
+        --------
+        >>> params.save("sky.toml")
+        >>> nubis.Params.load("sky.toml") == params
+        True
+        """
         import tomli_w  # here, as `tomllib` below: a first picture need not wait for them
 
-        def given(fields: dict[str, Any]) -> dict[str, Any]:
-            return {name: value for name, value in fields.items() if value is not None}
+        target = Path(path)
 
-        tables = {
-            block: [given(f) for f in fields] if isinstance(fields, list) else given(fields)
-            for block, fields in self.to_dict().items()
-        }
-        Path(path).write_text(tomli_w.dumps(tables), encoding="utf-8")
+        def given(name: str, group: Any) -> dict[str, Any]:
+            fields = {k: v for k, v in group.to_dict().items() if v is not None}
+            for field in fields:
+                value = getattr(group, field, None)
+                if isinstance(value, np.ndarray) and value.size > _LONGEST_INSIDE:
+                    fields[field] = _write_beside(target, f"{name}.{field}", value)
+            return fields
+
+        tables: dict[str, Any] = {}
+        for field in dataclasses.fields(self):
+            group = getattr(self, field.name)
+            if field.name == "weather_mix":
+                if group:
+                    tables[field.name] = [
+                        {"weight": weight, **given(f"weather_mix{i}", weather)}
+                        for i, (weather, weight) in enumerate(group)
+                    ]
+            elif group is not None:
+                tables[field.name] = given(field.name, group)
+        _nubis.write_bytes(target, tomli_w.dumps(tables).encode())
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
-        """Read parameters from a TOML file; fields left out have their defaults."""
+        """Read parameters from a TOML file; fields left out have their defaults.
+
+        An array is nested lists, or the name of a ``.npy`` file in the folder of the TOML file.
+
+        Raises
+        ------
+        ParameterError
+            For what is no TOML file, and values that are not allowed.
+        FileError
+            When an array that is named cannot be read.
+        """
         import tomllib
 
+        source = Path(path)
         try:
-            values = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+            # Editors on Windows begin files with a mark.
+            values = tomllib.loads(source.read_bytes().decode("utf-8-sig"))
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise ParameterError(
                 f"path = {os.fspath(path)!r} is not allowed: it must be a TOML file ({error})"
             ) from error
-        return cls.from_dict(values)
+        return cls.from_dict({k: _with_arrays(source, k, v) for k, v in values.items()})
 
 
-def _plain(block: str, name: str, value: Any) -> Any:
-    deep = isinstance(value, list) and value and isinstance(value[0], list)
-    return _array(block, name, value) if deep else value
+# Numbers of an array that a person may want to read and change in a TOML file.
+_LONGEST_INSIDE = 4096
+
+
+def _write_beside(target: Path, field: str, array: np.ndarray[Any, Any]) -> str:
+    """Write an array of the file `target`; return its name, by its content."""
+    out = io.BytesIO()
+    np.save(out, array, allow_pickle=False)
+    content = out.getvalue()
+    beside = target.with_name(f"{target.name}.{field}.{zlib.crc32(content):08x}.npy")
+    _nubis.write_bytes(beside, content)
+    return beside.name
+
+
+def _with_arrays(source: Path, name: str, value: Any) -> Any:
+    """A value of the file `source`, with arrays in place of the names of their files."""
+    if isinstance(value, Mapping):
+        return {k: _with_arrays(source, f"{name}.{k}", v) for k, v in value.items()}
+    if isinstance(value, list) and value and isinstance(value[0], Mapping):
+        return [_with_arrays(source, f"{name}[{i}]", v) for i, v in enumerate(value)]
+    if not (isinstance(value, str) and value.endswith(".npy")):
+        return value
+    try:
+        array = np.load(source.parent / value, allow_pickle=False)
+    except OSError as error:
+        raise FileError(f"{name} = {value!r} cannot be read: {error}") from error
+    except (ValueError, EOFError) as error:
+        raise ParameterError(
+            f"{name} = {value!r} is not allowed: it must be a file that numpy.save has written "
+            f"({error})"
+        ) from error
+    return array
 
 
 def _mixture(value: Any) -> tuple[tuple[Block, float], ...]:
@@ -253,18 +333,9 @@ def _mixture_from_tables(tables: Any) -> Sequence[tuple[Block, Any]]:
         for name, value in table.items():
             if name not in (*names, "weight"):
                 raise _unknown(f"{path}.{name}", value, ["weight", *names])
-        fields = {n: _plain(path, n, v) for n, v in table.items() if n != "weight"}
+        fields = {n: v for n, v in table.items() if n != "weight"}
         mixture.append((Weather(**fields), table["weight"]))
     return mixture
-
-
-def _array(block: str, name: str, value: list[Any]) -> np.ndarray[Any, Any]:
-    try:
-        return np.array(value, dtype=np.float32)
-    except (TypeError, ValueError) as error:
-        raise ParameterError(
-            f"{block}.{name} = (nested lists) is not allowed: they must form an array ({error})"
-        ) from error
 
 
 def _grid(fields: Mapping[str, Any]) -> DensityGrid:
@@ -275,10 +346,9 @@ def _grid(fields: Mapping[str, Any]) -> DensityGrid:
     for name in names:
         if name not in fields:
             raise ParameterError(f"volume.{name} is missing: a volume has {' and '.join(names)}")
-    return DensityGrid(_array("volume", "extinction", fields["extinction"]), fields["bounds"])
+    return DensityGrid(fields["extinction"], fields["bounds"])
 
 
 def _unknown(path: str, value: Any, names: list[str]) -> ParameterError:
-    return ParameterError(
-        f"{path} = {value!r} is not allowed: there is no such field, only {', '.join(names)}"
-    )
+    words = unknown(f"{path} = {value!r}", path, names, "a field that there is, one of")
+    return ParameterError(words)

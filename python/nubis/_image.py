@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 from pathlib import Path
 from typing import Any, Literal
@@ -10,29 +11,58 @@ import numpy as np
 import numpy.typing as npt
 
 from nubis import _nubis
+from nubis._arrays import numbers
 from nubis._errors import FileError, ParameterError
+
+#: What a picture's file can end in.
+ENDINGS = (".png", ".exr", ".hdr", ".npy")
 
 
 def to_srgb8(
     frame: npt.ArrayLike,
     exposure: float = 0.0,
     tonemap: Literal["agx", "aces", "none"] = "agx",
+    *,
+    dither: bool = True,
 ) -> npt.NDArray[np.uint8]:
     """Return 8-bit sRGB pixels: the only place where anything is clipped or gamma-encoded.
 
     Parameters
     ----------
     frame : array-like, shape (H, W, 3) or (H, W, 4)
-        Scene-linear radiance with Rec. 709 primaries. Alpha is passed on, linear.
+        Scene-linear radiance with Rec. 709 primaries. Where there is alpha, the radiance is
+        premultiplied by it, as of all pictures here.
     exposure : float
         Stops: 1 doubles the light.
     tonemap : {"agx", "aces", "none"}
         AgX (Sobotka, in Wrensch's polynomial form), ACES (Hill's fit), or plain clipping.
+    dither : bool
+        Adds blue noise of half a step to each side before rounding, the same in each picture, so
+        that slow gradients have no bands. Whole steps, such as black and white, stay as they are;
+        with False every number goes to the nearest step.
+
+    Returns
+    -------
+    array of uint8, shape (H, W, 3) or (H, W, 4)
+        Alpha is linear, rounded, and the colours are no longer multiplied by it (as in a PNG, in
+        Pillow and in matplotlib): they are divided before the tone map, which is for the radiance
+        of what is there. Where alpha is 0 they are those of no light.
+
+    Raises
+    ------
+    ParameterError
+        For an array that is no picture or has NaN in it, and other arguments that are not allowed.
+        Infinite radiance is white.
+
+    Examples
+    --------
+    >>> pixels = nubis.to_srgb8(renderer.render(camera, params), exposure=0.5)
     """
     if not isinstance(tonemap, str):
         raise ParameterError(f"tonemap = {tonemap!r} is not allowed: it must be a name")
+    _check_switch("dither", dither)
     stops = _nubis.number("exposure", exposure)
-    return _nubis.to_srgb8(_pixels(frame), stops, tonemap)
+    return _nubis.to_srgb8(_pixels(frame), stops, tonemap, dither)
 
 
 def auto_exposure(
@@ -69,7 +99,7 @@ def auto_exposure(
     """
     wanted = _nubis.number("key", key)
     first, last = _nubis.number("low", low), _nubis.number("high", high)
-    return _nubis.auto_exposure(_pixels(frame), wanted, first, last)
+    return _nubis.auto_exposure(_pixels(frame, nonfinite="nan"), wanted, first, last)
 
 
 def heat(counts: npt.NDArray[np.uint32], white: int = 1000) -> npt.NDArray[np.uint8]:
@@ -85,46 +115,84 @@ def save(
     *,
     exposure: float | Literal["auto"] = 0.0,
     tonemap: Literal["agx", "aces", "none"] = "agx",
+    dither: bool = True,
 ) -> None:
     """Write a picture; the ending says how.
 
-    ``.png`` is tone-mapped with `to_srgb8` (alpha is kept where any pixel is not opaque);
-    ``.exr`` (float32), ``.hdr`` (Radiance, no alpha) and ``.npy`` stay linear. An exposure of
-    ``"auto"`` is that of `auto_exposure`.
+    ``.png`` is made by `to_srgb8` (alpha is kept where any pixel is not opaque); ``.exr``
+    (float32), ``.hdr`` (Radiance, 8 bits and a common exponent, no alpha, nothing below 0) and
+    ``.npy`` stay linear. The file is written under another name beside its place and renamed when
+    it is whole: who reads finds the old picture or the new one, whatever happens meanwhile.
+
+    Parameters
+    ----------
+    path : path
+        Ends in .png, .exr, .hdr or .npy.
+    frame : array-like, shape (H, W, 3) or (H, W, 4)
+        Linear radiance, premultiplied by alpha where there is one; finite.
+    exposure : float or "auto"
+        Stops, or `auto_exposure` of the frame (png).
+    tonemap, dither
+        As for `to_srgb8` (png).
 
     Raises
     ------
     ParameterError
-        For another ending, or an array that is no picture.
+        For another ending, or an array that is no picture of finite numbers.
     FileError
         When the file cannot be written.
+
+    Examples
+    --------
+    >>> nubis.save("sky.png", frame, exposure="auto")
     """
-    target = Path(path)
-    kind = target.suffix.lower()
-    pixels = _pixels(frame)
+    target = _check_ending(path)
+    pixels = _pixels(frame, nonfinite="")
     if isinstance(exposure, str) and exposure != "auto":
         raise ParameterError(
             f"exposure = {exposure!r} is not allowed: it must be a number of stops or 'auto'"
         )
+    _nubis.check_target(target)
+    kind = target.suffix.lower()
     if kind == ".png":
         stops = auto_exposure(pixels) if isinstance(exposure, str) else exposure
-        image = to_srgb8(pixels, stops, tonemap)
+        image = to_srgb8(pixels, stops, tonemap, dither=dither)
         if image.shape[2] == 4 and np.all(image[..., 3] == 255):
             image = np.ascontiguousarray(image[..., :3])
-        _nubis.write_png(target, _straight(image))
+        _nubis.write_png(target, image)
     elif kind == ".exr":
         _nubis.write_exr(target, pixels)
     elif kind == ".hdr":
         _nubis.write_hdr(target, pixels)
-    elif kind == ".npy":
-        try:
-            np.save(target, pixels)
-        except OSError as error:
-            raise FileError(f"{target}: {error}") from error
     else:
-        raise ParameterError(
-            f"path = {os.fspath(path)!r} is not allowed: it must end in .png, .exr, .hdr or .npy"
-        )
+        _nubis.write_bytes(target, npy(pixels))
+
+
+def check_target(path: str | os.PathLike[str]) -> None:
+    """Raise what `save` would for a path: asked before pictures are made that would be lost."""
+    _nubis.check_target(_check_ending(path))
+
+
+def npy(array: npt.NDArray[Any]) -> bytes:
+    """The bytes of a file as `numpy.save` writes it."""
+    out = io.BytesIO()
+    np.save(out, array, allow_pickle=False)
+    return out.getvalue()
+
+
+def _check_ending(path: str | os.PathLike[str]) -> Path:
+    try:
+        target = Path(path)
+    except TypeError:
+        raise ParameterError(f"path = {path!r} is not allowed: it must be a path") from None
+    if target.suffix.lower() not in ENDINGS:
+        raise _refused(target, f"a path that ends in {', '.join(ENDINGS[:-1])} or {ENDINGS[-1]}")
+    return target
+
+
+def _check_switch(name: str, value: Any) -> None:
+    if not isinstance(value, bool | np.bool_):
+        raise ParameterError(f"{name} = {value!r} is not allowed: it must be True or False")
 
 
 def load_map(path: str | os.PathLike[str]) -> npt.NDArray[np.float32]:
@@ -150,14 +218,9 @@ def load_map(path: str | os.PathLike[str]) -> npt.NDArray[np.float32]:
     FileError
         When the file cannot be read.
     """
-    source = Path(path)
-    kind = source.suffix.lower()
-    if kind == ".npy":
-        pixels = _load_array(source)
-    elif kind in (".png", ".exr", ".hdr"):
-        pixels = _nubis.read_pixels(source)
-    else:
-        raise _refused(source, "a path that ends in .png, .exr, .hdr or .npy")
+    source = _check_ending(path)
+    npy_file = source.suffix.lower() == ".npy"
+    pixels = _load_array(source) if npy_file else _nubis.read_pixels(source)
     bad = pixels[~((pixels >= 0) & (pixels <= 1))]
     if bad.size:
         raise _refused(source, f"a map with values from 0 to 1 (it has {bad[0]})")
@@ -197,24 +260,13 @@ def _refused(path: Path, allowed: str) -> ParameterError:
     return ParameterError(f"path = {os.fspath(path)!r} is not allowed: it must be {allowed}")
 
 
-def _straight(image: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
-    """PNG holds colours that are not multiplied by alpha."""
-    if image.shape[2] == 3:
-        return image
-    alpha = image[..., 3:].astype(np.float32) / 255
-    colour = np.divide(image[..., :3], alpha, out=np.zeros(image[..., :3].shape), where=alpha > 0)
-    return np.concatenate([np.clip(colour + 0.5, 0, 255), image[..., 3:]], axis=2).astype(np.uint8)
-
-
-def _pixels(frame: Any) -> npt.NDArray[np.float32]:
-    try:
-        pixels = np.ascontiguousarray(frame, dtype=np.float32)
-    except (TypeError, ValueError) as error:
-        raise ParameterError(
-            f"frame is not allowed: it must be an array of numbers ({error})"
-        ) from None
-    if pixels.ndim != 3 or pixels.shape[2] not in (3, 4) or 0 in pixels.shape:
-        raise ParameterError(
-            f"frame of shape {pixels.shape} is not allowed: it must be (H, W, 3) or (H, W, 4)"
-        )
-    return pixels
+def _pixels(frame: Any, nonfinite: str = "inf") -> npt.NDArray[np.float32]:
+    return numbers(
+        "frame",
+        frame,
+        "an array of numbers of shape (H, W, 3) or (H, W, 4)",
+        shapes=[(None, None, 3), (None, None, 4)],
+        dims=("y", "x"),
+        dtype=np.float32,
+        nonfinite=nonfinite,
+    )

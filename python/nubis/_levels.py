@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from types import MappingProxyType
 from typing import Any
 
 import numpy.typing as npt
 
 from nubis._errors import ParameterError
+from nubis._names import Named
 from nubis._nubis import DensityGrid
 from nubis.params import Params
 
@@ -60,7 +60,7 @@ def _make() -> dict[str, Params]:
 
 
 #: Skies by name: clouds of each kind, with the default sun, wind and air.
-presets: Mapping[str, Params] = MappingProxyType(_make())
+presets: Mapping[str, Params] = Named("preset", _make())
 
 
 def sky(
@@ -87,7 +87,8 @@ def sky(
         takes it as it is, whatever `cover` and `preset` say of these: ``clouds.coverage`` 0.5,
         ``clouds.type`` 0.5, ``clouds.precipitation`` 1.
     volume : DensityGrid, optional
-        A cloud of your own. Sets ``volume``: it takes the place of all clouds but the high ones.
+        A cloud of your own. Sets ``volume``: it takes the place of all other clouds. High ones come
+        with it where ``high_clouds.with_volume`` is True.
     **fields
         Deep fields, which override all of these: ``**{"sun.elevation": 5.0}``.
 
@@ -98,10 +99,6 @@ def sky(
     """
     params = Params()
     if preset is not None:
-        if not isinstance(preset, str) or preset not in presets:
-            raise ParameterError(
-                f"preset = {preset!r} is not allowed: it must be one of {', '.join(presets)}"
-            )
         params = presets[preset]
     if cover is not None:
         try:

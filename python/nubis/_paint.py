@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nubis import _nubis
+from nubis._arrays import Shape, first_bad, numbers
 from nubis._errors import ParameterError
 
 Channel = Literal["coverage", "type", "precipitation"]
@@ -103,12 +104,8 @@ def paint_mask(
         _one_of("mode", mode, Mode)
     ]
     strength = _number("amount", amount, low, high)
-    share = _numbers("mask", mask, f"an array of shape {texels.shape[:2]}, values from 0 to 1")
-    if share.shape != texels.shape[:2]:
-        raise ParameterError(
-            f"mask of shape {share.shape} is not allowed: it must be as the map, {texels.shape[:2]}"
-        )
-    _in_range("mask", share)
+    height, width, _ = texels.shape
+    share = _shares("mask", mask, (height, width))
     old = texels[..., index].astype(np.float64)
     if mode == "add":
         new = old + strength * share
@@ -186,39 +183,26 @@ def _squared_distance(
 
 def _map(value: npt.ArrayLike) -> Map:
     """A copy, checked."""
-    allowed = "an array of numbers of shape (H, W, 3), values from 0 to 1"
-    texels = _numbers("map", value, allowed)
-    if texels.ndim != 3 or texels.shape[2] != 3 or 0 in texels.shape:
-        raise ParameterError(f"map of shape {texels.shape} is not allowed: it must be {allowed}")
-    _in_range("map", texels)
-    return texels.astype(np.float32)
+    return _shares("map", value, (None, None, 3)).astype(np.float32)
 
 
 def _path(value: npt.ArrayLike) -> npt.NDArray[np.float64]:
     allowed = "a point (x, y) or points of shape (N, 2), world metres within 1e7 of the origin"
-    points = np.atleast_2d(_numbers("at", value, allowed))
-    if points.ndim != 2 or points.shape[1] != 2 or len(points) == 0:
-        raise ParameterError(f"at of shape {points.shape} is not allowed: it must be {allowed}")
-    bad = points[~(np.abs(points) <= 1e7)]
-    if bad.size:
-        raise ParameterError(f"at with {bad[0]} is not allowed: it must be {allowed}")
-    return points
+    points = numbers("at", value, allowed, shapes=[(2,), (None, 2)])
+    beyond = np.abs(points) > 1e7
+    if beyond.any():
+        raise first_bad("at", points, beyond, allowed)
+    return np.atleast_2d(points)
 
 
-def _numbers(name: str, value: Any, allowed: str) -> npt.NDArray[np.float64]:
-    try:
-        array = np.asarray(value)
-    except ValueError as error:
-        raise ParameterError(f"{name} is not allowed: it must be {allowed} ({error})") from None
-    if array.dtype.kind not in "fiu":
-        raise ParameterError(f"{name} of {array.dtype} is not allowed: it must be {allowed}")
-    return array.astype(np.float64)
-
-
-def _in_range(name: str, values: npt.NDArray[np.float64]) -> None:
-    bad = values[~((values >= 0) & (values <= 1))]
-    if bad.size:
-        raise ParameterError(f"{name} with {bad[0]} is not allowed: values must be from 0 to 1")
+def _shares(name: str, value: Any, shape: Shape) -> npt.NDArray[np.float64]:
+    shown = str(shape).replace("None, None", "H, W")
+    allowed = f"an array of numbers of shape {shown}, values from 0 to 1"
+    values = numbers(name, value, allowed, shapes=[shape], dims=("y", "x"))
+    bad = (values < 0) | (values > 1)
+    if bad.any():
+        raise first_bad(name, values, bad, allowed)
+    return values
 
 
 def _number(name: str, value: Any, low: float, high: float, unit: str = "") -> float:

@@ -12,7 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from nubis import _nubis
-from nubis._errors import ParameterError
+from nubis._arrays import numbers
+from nubis._errors import AdapterError, ParameterError
+from nubis._names import unknown
 from nubis._nubis import Camera
 from nubis._scene_depth import checked as checked_scene
 from nubis._shadow import ShadowMap, SunVisibility, seen_sun, world_from_map
@@ -25,6 +27,18 @@ Shot = (
     | tuple[Camera, Params, float, npt.ArrayLike | None, npt.ArrayLike | None]
 )
 Background = Literal["sky"] | None
+
+#: The names of the numerical methods.
+QUALITIES = (
+    "preview",
+    "draft",
+    "balanced",
+    "high",
+    "reference",
+    "nubis2015",
+    "thesis2018",
+    "vsu2022",
+)
 
 _warned = False
 
@@ -63,7 +77,10 @@ def quality(name: str) -> Quality:
     """
     if not isinstance(name, str):
         raise ParameterError(f"quality = {name!r} is not allowed: it must be a name or a Quality")
-    return Quality(**_nubis.quality(name))
+    try:
+        return Quality(**_nubis.quality(name))
+    except ParameterError:
+        raise ParameterError(unknown(f"quality = {name!r}", name, QUALITIES)) from None
 
 
 class Renderer:
@@ -108,7 +125,12 @@ class Renderer:
         size = _size("width", width), _size("height", height)
         _nubis.check_quality(self._quality)
         wanted = os.environ.get("NUBIS_ADAPTER") if adapter is None else str(adapter)
-        self._core = _nubis.Renderer(*size, self._quality, wanted or None)
+        try:
+            self._core = _nubis.Renderer(*size, self._quality, wanted or None)
+        except AdapterError as error:
+            if adapter is not None or not wanted:
+                raise
+            raise AdapterError(f"NUBIS_ADAPTER = {wanted!r}: {error}") from None
         self._size = size
         if not wanted:
             _warn_once(self.adapter)
@@ -159,11 +181,11 @@ class Renderer:
             through the air, premultiplied, alpha = 1 - transmittance.
         scene_depth : array-like, shape (height, width), optional
             A scene of yours among the clouds: metres along the ray of each pixel, not along the
-            axis of the camera (`distance_from_z`); inf where there is nothing. Only what lies in
-            front of it is seen. It hides the plain ground too, and casts no shadow. Without
-            `scene_color`, and with the sky, its pixels hold the clouds and the air in front of it,
-            premultiplied, with alpha below 1: ``frame + (1 - alpha) * yours`` is the picture, in
-            which alpha has the luminance of the air's transmittance.
+            axis of the camera (`distance_from_z`); inf, or any number above 1e10, where there is
+            nothing. Only what lies in front of it is seen. It hides the plain ground too, and casts
+            no shadow. Without `scene_color`, and with the sky, its pixels hold the clouds and the
+            air in front of it, premultiplied, with alpha below 1: ``frame + (1 - alpha) * yours``
+            is the picture, in which alpha has the luminance of the air's transmittance.
         scene_color : array-like, shape (height, width, 3) or (height, width, 4), optional
             Linear radiance of that scene, seen through air and clouds with each colour dimmed in
             its own way. A fourth number is how much of the pixel the scene covers, 0 to 1, and the
@@ -418,13 +440,8 @@ class Renderer:
             For a place, extent or size that is not allowed.
         """
         _check_params(params)
-        try:
-            x, y = center
-        except Exception:  # whatever a class of its own raises
-            raise ParameterError(
-                f"center = {center!r} is not allowed: it must be 2 numbers"
-            ) from None
-        place = _nubis.number("center", x), _nubis.number("center", y)
+        x, y = numbers("center", center, "2 finite numbers", shapes=[(2,)])
+        place = float(x), float(y)
         side, z = _nubis.number("extent", extent), _nubis.number("altitude", altitude)
         texels = _size("size", size)
         map_ = self._core.shadow_map(params, _time(time), place, z, side, texels)
@@ -450,7 +467,7 @@ class Renderer:
         time : float
             Seconds.
         scene_depth : array-like, shape (height, width), optional
-            As for `render`: where it is finite, it hides the sun.
+            As for `render`: where it is at most 1e10, it hides the sun.
 
         Returns
         -------

@@ -8,10 +8,14 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from nubis._arrays import first_bad, numbers
 from nubis._errors import ParameterError
 from nubis._nubis import Camera
 
 Array = npt.NDArray[np.float32]
+
+# Farthest distance of a scene in m: beyond it is sky (crates/clouds_core/src/scene_depth.rs).
+FARTHEST = np.float32(1e10)
 
 
 class Scene(NamedTuple):
@@ -30,6 +34,8 @@ def checked(depth: Any, color: Any, size: tuple[int, int]) -> Scene | None:
         return None
     width, height = size
     depth = _numbers("scene_depth", depth, [(height, width)], finite=False)
+    if (beyond := np.isfinite(depth) & (depth > FARTHEST)).any():
+        depth = np.where(beyond, np.float32(np.inf), depth)
     if color is None:
         return None if np.isinf(depth).all() else Scene(depth, None, None)
     color = _numbers("scene_color", color, [(height, width, 3), (height, width, 4)], finite=True)
@@ -39,7 +45,7 @@ def checked(depth: Any, color: Any, size: tuple[int, int]) -> Scene | None:
         return Scene(depth, color, None)
     cover = color[..., 3]
     if (cover > 1).any():
-        raise _refused("scene_color[..., 3]", cover, cover > 1, "from 0 to 1")
+        raise first_bad("scene_color[..., 3]", cover, cover > 1, "from 0 to 1")
     # What covers nothing is not there; what is, is as bright as it is however little it covers.
     depth = np.where(cover > 0, depth, np.float32(np.inf))
     whole = np.ascontiguousarray(color[..., :3] / np.where(cover > 0, cover, 1)[..., None])
@@ -49,30 +55,23 @@ def checked(depth: Any, color: Any, size: tuple[int, int]) -> Scene | None:
     return Scene(depth, whole, None if (cover[there] == 1).all() else cover)
 
 
-def _numbers(name: str, value: Any, shapes: list[tuple[int, ...]], *, finite: bool) -> Array:
-    allowed = "an array of numbers of shape " + " or ".join(map(str, shapes))
-    try:
-        array = np.asarray(value)
-    except Exception:  # whatever a class of its own raises
-        raise ParameterError(f"{name} is not allowed: it must be {allowed}") from None
-    if array.dtype.kind not in "fiu" or array.shape not in shapes:
-        raise ParameterError(
-            f"{name} = array of shape {array.shape} and dtype {array.dtype} is not allowed: "
-            f"it must be {allowed}"
-        )
-    with np.errstate(over="ignore"):
-        numbers = np.ascontiguousarray(array, dtype=np.float32)
-    bad = ~(numbers >= 0) | (np.isinf(numbers) if finite else False)
-    if bad.any():
-        raise _refused(name, array, bad, "finite and not negative" if finite else "0 m to infinity")
-    return numbers
-
-
-def _refused(name: str, array: Any, bad: Any, allowed: str) -> ParameterError:
-    at = tuple(int(i) for i in np.argwhere(bad)[0])
-    return ParameterError(
-        f"{name}[{', '.join(map(str, at))}] = {array[at]} is not allowed: it must be {allowed}"
+def _numbers(name: str, value: Any, shapes: list[tuple[int | None, ...]], *, finite: bool) -> Array:
+    shown = " or ".join(str(shape).replace("None", "N") for shape in shapes)
+    rule = "finite and not negative" if finite else "0 m to infinity"
+    allowed = f"an array of numbers of shape {shown}, {rule}"
+    array = numbers(
+        name,
+        value,
+        allowed,
+        shapes=shapes,
+        dims=("y", "x"),
+        dtype=np.float32,
+        nonfinite="" if finite else "inf",
     )
+    bad = array < 0
+    if bad.any():
+        raise first_bad(name, array, bad, rule)
+    return array
 
 
 def distance_from_z(camera: Camera, z: npt.ArrayLike) -> Array:
@@ -99,12 +98,7 @@ def distance_from_z(camera: Camera, z: npt.ArrayLike) -> Array:
     """
     if not isinstance(camera, Camera) or camera.kind != "perspective":
         raise ParameterError(f"camera = {camera!r} is not allowed: it must be a pinhole camera")
-    array = np.asarray(z)
-    if array.ndim != 2 or 0 in array.shape:
-        raise ParameterError(
-            f"z = array of shape {array.shape} is not allowed: it must be (height, width)"
-        )
-    array = _numbers("z", array, [array.shape], finite=False)
+    array = _numbers("z", z, [(None, None)], finite=False)
     height, width = array.shape
     tan = math.tan(math.radians(camera.fov) / 2)
     x = (2 * (np.arange(width) + 0.5) / width - 1) * tan * width / height

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from types import MappingProxyType
 
 from nubis._levels import presets
+from nubis._names import Named
 from nubis._nubis import Camera
 from nubis.params import Params
 
@@ -107,4 +107,4 @@ def _make() -> dict[str, tuple[Camera, Params]]:
 
 
 #: Skies to start from: name -> (camera, parameters).
-scenes: Mapping[str, tuple[Camera, Params]] = MappingProxyType(_make())
+scenes: Mapping[str, tuple[Camera, Params]] = Named("scene", _make())

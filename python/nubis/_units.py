@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from nubis._arrays import UnfitError, opened
 from nubis._errors import ParameterError
 
 #: Shares of red, green and blue in the luminance, for Rec. 709 primaries (ITU-R BT.709).
@@ -43,16 +44,13 @@ def luminance(frame: npt.ArrayLike) -> npt.NDArray[np.float32]:
         For an array of another shape, or what is no array of numbers.
     """
     try:
-        pixels = np.asarray(frame, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise ParameterError(
-            f"frame = {type(frame).__name__} is not allowed: it must be an array ({error})"
-        ) from error
+        pixels = opened(frame)
+    except UnfitError as error:
+        raise ParameterError(f"frame = {error} is not allowed: it must be an array") from None
     if pixels.ndim < 1 or pixels.shape[-1] not in (3, 4):
         raise ParameterError(
             f"frame of shape {pixels.shape} is not allowed: it must be (..., 3) or (..., 4)"
         )
-    values: npt.NDArray[np.float32] = (LUMINOUS_EFFICACY * (pixels[..., :3] @ LUMINANCE)).astype(
-        np.float32
-    )
+    weighted = LUMINOUS_EFFICACY * (pixels[..., :3].astype(np.float64) @ LUMINANCE)
+    values: npt.NDArray[np.float32] = weighted.astype(np.float32)
     return values

@@ -347,6 +347,9 @@ class HighClouds(Block):
     ----------
     coverage : float
         How much of the sky they cover: 0 is clear, 1 overcast. Allowed: a number from 0 to 1.
+    with_volume : bool
+        Whether they are there with a `volume` too, which is otherwise all the cloud that there is.
+        Allowed: True or False.
     type : float
         Cloud type: 0 cirrus in streaks, 1 altocumulus in cells, and between them both, here more of
         one, there of the other. Allowed: a number from 0 to 1.
@@ -382,6 +385,7 @@ class HighClouds(Block):
     """
 
     coverage: float = 0.5
+    with_volume: bool = False
     type: float = 0.0
     altitude: float = 8500.0
     optical_depth: float = 0.5
@@ -658,7 +662,8 @@ class Params(Root):
         the rest is that of `weather`. All have the same `extent` and `edge`. Weathers change by it
         (thesis2018): see `WeatherBlend` and `lerp`.
     volume : DensityGrid or None
-        A cloud of your own in place of the procedural ones.
+        A cloud of your own in place of all others: high clouds come with it where
+        `high_clouds.with_volume` is True.
     """
 
     sun: Sun = field(default_factory=Sun)

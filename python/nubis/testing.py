@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from nubis._arrays import numbers
 from nubis._renderer import Renderer
 from nubis.params import Params, Quality
 
@@ -35,7 +36,14 @@ def probe(
     -------
     values : array of float32, shape (N, 4)
     """
-    given = np.asarray(inputs, dtype=np.float32)
+    given = numbers(
+        "inputs",
+        inputs,
+        "an array of numbers of shape (N,) or (N, k), k up to 4",
+        shapes=[(None,), *((None, k) for k in range(1, 5))],
+        dtype=np.float32,
+        nonfinite="nan",
+    )
     given = given.reshape(len(given), -1)
     full = np.zeros((len(given), 4), dtype=np.float32)
     full[:, : given.shape[1]] = given

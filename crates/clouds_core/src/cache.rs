@@ -47,7 +47,8 @@ pub fn clear() -> Result<()> {
     for file in files(&folder, PREFIX) {
         match fs::remove_file(&file.path) {
             Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-                return Err(Error::File(format!("{}: {error}", file.path.display())));
+                let named = if std::env::var_os("NUBIS_CACHE").is_some() { "NUBIS_CACHE: " } else { "" };
+                return Err(Error::File(format!("{named}{}: {error}", file.path.display())));
             }
             _ => {}
         }

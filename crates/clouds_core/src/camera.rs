@@ -52,11 +52,9 @@ fn finite(field: &str, v: DVec3, limit: f64) -> Result<DVec3> {
     if v.abs().max_element() <= limit && v.is_finite() {
         return Ok(v);
     }
-    Err(Error::parameter(
-        field,
-        format!("({}, {}, {})", v.x, v.y, v.z),
-        format!("3 finite numbers from {} to {limit}", -limit),
-    ))
+    // All that f64 holds has 309 digits.
+    let range = if limit < f64::MAX { format!(" from {} to {limit}", -limit) } else { String::new() };
+    Err(Error::parameter(field, format!("({}, {}, {})", v.x, v.y, v.z), format!("3 finite numbers{range}")))
 }
 
 /// The vector made one long. Scaled first: the square of a length below 1e-154 m or above 1e154 m is no f64.

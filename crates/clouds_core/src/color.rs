@@ -1,5 +1,6 @@
 //! From scene-linear Rec. 709 radiance to sRGB pixels: the only place where anything is clipped or gamma-encoded.
 
+use crate::blue_noise;
 use crate::error::{Error, Result};
 
 /// The tone maps by name.
@@ -68,16 +69,42 @@ pub(crate) fn tone_map_index(exposure: f32, tone_map: &str) -> Result<usize> {
     Ok(index)
 }
 
-/// Turns pixels of `channels` (3 or 4) numbers into 8-bit sRGB. Alpha, where there is one, is kept linear; premultiplied
-/// colours stay premultiplied.
-pub fn to_srgb8(pixels: &[f32], channels: usize, exposure: f32, tone_map: &str) -> Result<Vec<u8>> {
+/// Turns pixels of `channels` (3 or 4) numbers, row by row in rows of `width`, into 8-bit sRGB.
+///
+/// Where there is alpha, the colours that come in are premultiplied and those that go out are not, as in a PNG: a tone map
+/// is for the radiance of what is there, however little it covers. Alpha is kept linear.
+///
+/// `dither` adds fixed blue noise of half a step to each side before rounding, the same to all colours: the mean over some
+/// pixels is right to a small part of a step, and grey stays grey. Whole steps, such as 0 and 255, are what they were.
+pub fn to_srgb8(
+    pixels: &[f32],
+    channels: usize,
+    width: usize,
+    exposure: f32,
+    tone_map: &str,
+    dither: bool,
+) -> Result<Vec<u8>> {
     let map = [agx, aces, |v: Rgb| v.map(encode_srgb)][tone_map_index(exposure, tone_map)?];
     let gain = exposure.exp2();
-    let byte = |v: f32| (v * 255.0 + 0.5) as u8;
+    let byte = |v: f32, threshold: f32| (v * 255.0 + threshold) as u8;
+    let tile: &[f32] = if dither { &blue_noise::TILE } else { &[] };
     let mut out = Vec::with_capacity(pixels.len());
-    for pixel in pixels.chunks_exact(channels) {
-        out.extend(map([pixel[0] * gain, pixel[1] * gain, pixel[2] * gain]).map(byte));
-        out.extend(pixel[3..].iter().map(|alpha| byte(alpha.clamp(0.0, 1.0))));
+    for (y, row) in pixels.chunks(channels * width.max(1)).enumerate() {
+        for (x, pixel) in row.chunks_exact(channels).enumerate() {
+            let rank = tile.get(y % blue_noise::SIZE * blue_noise::SIZE + x % blue_noise::SIZE);
+            // A rank is that below its point: half a step of ranks is missing to the mean of 1/2.
+            let threshold = rank.map_or(0.5, |rank| rank + 0.5 / (blue_noise::SIZE * blue_noise::SIZE) as f32);
+            let gain = match pixel.get(3) {
+                Some(alpha) if *alpha > 0.0 => gain / alpha.min(1.0),
+                Some(_) => 0.0,
+                None => gain,
+            };
+            // Nothing of endless light is no number, but nothing.
+            let exposed = |v: f32| if gain > 0.0 { v * gain } else { 0.0 };
+            let color = map([exposed(pixel[0]), exposed(pixel[1]), exposed(pixel[2])]);
+            out.extend(color.map(|v| byte(v, threshold)));
+            out.extend(pixel[3..].iter().map(|alpha| byte(alpha.clamp(0.0, 1.0), 0.5)));
+        }
     }
     Ok(out)
 }

@@ -1,11 +1,15 @@
 //! Pictures on disk: PNG of 8-bit pixels, EXR and Radiance HDR of linear ones; and pictures as numbers, from all three.
 
-use std::fs::File;
-use std::io::{BufReader, BufWriter};
+use std::ffi::OsString;
+use std::fs::{self, File, OpenOptions};
+use std::io::{BufReader, BufWriter, Cursor, ErrorKind, Write as _};
 use std::path::Path;
 
-use exr::prelude::{ReadChannels as _, ReadLayers as _, write_rgb_file, write_rgba_file};
+use exr::prelude::{Image, ReadChannels as _, ReadLayers as _, SpecificChannels, WritableImage as _};
+use image::ImageEncoder as _;
 use image::codecs::hdr::HdrEncoder;
+use image::codecs::png::PngEncoder;
+use tempfile::NamedTempFile;
 
 use crate::error::{Error, Result};
 
@@ -13,35 +17,129 @@ fn failed(path: &Path, error: impl std::fmt::Display) -> Error {
     Error::File(format!("{}: {error}", path.display()))
 }
 
+/// Whether a file can be written there: its folder exists and takes files, and what it would replace is a file that may be
+/// written. Asked before work that would be lost.
+pub fn check_target(path: &Path) -> Result<()> {
+    let refuse = |error: std::io::Error| failed(path, error);
+    match fs::metadata(path) {
+        Ok(about) if about.is_dir() => Err(failed(path, "it is a folder")),
+        Ok(about) => {
+            OpenOptions::new().write(true).open(path).map_err(refuse)?;
+            if about.is_file() { beside(path).map(drop).map_err(refuse) } else { Ok(()) }
+        }
+        Err(error) if error.kind() == ErrorKind::NotFound => beside(path).map(drop).map_err(refuse),
+        Err(error) => Err(refuse(error)),
+    }
+}
+
+/// A file in the folder of `path`, to take its place; removed if it does not.
+fn beside(path: &Path) -> std::io::Result<NamedTempFile> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut prefix = OsString::from(".");
+    // Names may have 255 bytes.
+    prefix.push(path.file_name().filter(|name| name.len() <= 200).unwrap_or_default());
+    prefix.push(".");
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(&prefix).suffix(".part");
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt as _;
+        // As of a file that is created: less what the umask takes.
+        builder.permissions(fs::Permissions::from_mode(0o666));
+    }
+    builder.tempfile_in(folder)
+}
+
+/// Writes a file under another name beside its place, and renames it when it is whole and on the disk: whoever reads, and
+/// whatever ends the process, finds the file that was there before, or the new one. What is no file, such as a pipe or
+/// `/dev/stdout`, is written in place.
+pub fn replace(path: &Path, write: impl FnOnce(&mut BufWriter<&File>) -> Result<(), String>) -> Result<()> {
+    // Through links: they go on pointing to it.
+    let target = fs::canonicalize(path);
+    let (target, old) = match &target {
+        Ok(target) => (target.as_path(), fs::metadata(target).ok()),
+        Err(_) => (path, None),
+    };
+    let io = |error: std::io::Error| failed(path, error);
+    if old.as_ref().is_some_and(|about| !about.is_file() && !about.is_dir()) {
+        let file = OpenOptions::new().write(true).open(target).map_err(io)?;
+        let mut writer = BufWriter::new(&file);
+        write(&mut writer).map_err(|error| failed(path, error))?;
+        return writer.flush().map_err(io);
+    }
+    check_target(target)?;
+    let new = beside(target).map_err(io)?;
+    let mut writer = BufWriter::new(new.as_file());
+    write(&mut writer).map_err(|error| failed(path, error))?;
+    writer.flush().map_err(io)?;
+    drop(writer);
+    if let Some(old) = old {
+        new.as_file().set_permissions(old.permissions()).map_err(io)?;
+    }
+    new.as_file().sync_all().map_err(io)?;
+    new.persist(target).map_err(|error| io(error.error))?;
+    Ok(())
+}
+
+/// Writes bytes.
+pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
+    replace(path, |out| out.write_all(bytes).map_err(|error| error.to_string()))
+}
+
 /// Writes 8-bit pixels of 3 or 4 channels as PNG.
 pub fn write_png(path: &Path, pixels: &[u8], size: [usize; 2], channels: usize) -> Result<()> {
     let color = if channels == 4 { image::ExtendedColorType::Rgba8 } else { image::ExtendedColorType::Rgb8 };
-    image::save_buffer_with_format(path, pixels, size[0] as u32, size[1] as u32, color, image::ImageFormat::Png)
-        .map_err(|error| failed(path, error))
+    replace(path, |out| {
+        let encoded = PngEncoder::new(out).write_image(pixels, size[0] as u32, size[1] as u32, color);
+        encoded.map_err(|error| error.to_string())
+    })
 }
 
 /// Writes linear pixels of 3 or 4 channels as OpenEXR, 32-bit float.
 pub fn write_exr(path: &Path, pixels: &[f32], size: [usize; 2], channels: usize) -> Result<()> {
-    let at = |x: usize, y: usize| &pixels[(y * size[0] + x) * channels..];
-    let written = if channels == 4 {
-        write_rgba_file(path, size[0], size[1], |x, y| {
-            let p = at(x, y);
+    let at = |place: exr::math::Vec2<usize>| &pixels[(place.y() * size[0] + place.x()) * channels..];
+    let text = |error: exr::error::Error| error.to_string();
+    // Whole before it is written, as its table of offsets comes last: what is no file cannot be gone back in.
+    let mut bytes = Cursor::new(Vec::with_capacity(4 * pixels.len()));
+    if channels == 4 {
+        let colors = SpecificChannels::rgba(|place| {
+            let p = at(place);
             (p[0], p[1], p[2], p[3])
-        })
+        });
+        Image::from_channels((size[0], size[1]), colors).write().to_buffered(&mut bytes).map_err(text)
     } else {
-        write_rgb_file(path, size[0], size[1], |x, y| {
-            let p = at(x, y);
+        let colors = SpecificChannels::rgb(|place| {
+            let p = at(place);
             (p[0], p[1], p[2])
-        })
-    };
-    written.map_err(|error| failed(path, error))
+        });
+        Image::from_channels((size[0], size[1]), colors).write().to_buffered(&mut bytes).map_err(text)
+    }
+    .map_err(|error| failed(path, error))?;
+    write_bytes(path, bytes.get_ref())
 }
 
-/// Writes the colours of linear pixels of 3 or 4 channels as Radiance HDR, which has no alpha.
+/// Writes the colours of linear pixels of 3 or 4 channels as Radiance HDR, which has no alpha and nothing below 0.
 pub fn write_hdr(path: &Path, pixels: &[f32], size: [usize; 2], channels: usize) -> Result<()> {
-    let file = File::create(path).map_err(|error| failed(path, error))?;
-    let colors: Vec<_> = pixels.chunks_exact(channels).map(|p| image::Rgb([p[0], p[1], p[2]])).collect();
-    HdrEncoder::new(BufWriter::new(file)).encode(&colors, size[0], size[1]).map_err(|error| failed(path, error))
+    let colors: Vec<_> = pixels.chunks_exact(channels).map(|p| image::Rgb(rounded_rgbe([p[0], p[1], p[2]]))).collect();
+    replace(path, |out| HdrEncoder::new(out).encode(&colors, size[0], size[1]).map_err(|error| error.to_string()))
+}
+
+/// The colour whose mantissas, truncated as `HdrEncoder` does it, are those of `rgb`, rounded: readers take mantissa / 256
+/// times the power of two, so that truncated colours come out 0.27 % too dark.
+fn rounded_rgbe(rgb: [f32; 3]) -> [f32; 3] {
+    let largest = rgb.into_iter().fold(0.0, f32::max);
+    // Beyond the smallest power of two; readers see 0.
+    if largest < 2f32.powi(-126) {
+        return [0.0; 3];
+    }
+    // Exact: those of an f32 are its bits.
+    let mut exponent = (largest.to_bits() >> 23) as i32 - 126;
+    if (f64::from(largest) * 2f64.powi(8 - exponent)).round() >= 256.0 {
+        exponent += 1;
+    }
+    // The largest power of two that the byte holds, as of any colour beyond it.
+    let step = 2f64.powi(exponent.min(127) - 8);
+    rgb.map(|v| (((f64::from(v.max(0.0)) / step).round().min(255.0) + 0.5) * step) as f32)
 }
 
 /// A picture as it stands in a file.
@@ -99,4 +197,28 @@ fn read_exr(file: BufReader<File>) -> Result<Pixels, String> {
         data.iter_mut().skip(index).step_by(chosen.len()).zip(values).for_each(|(out, value)| *out = value);
     }
     Ok(Pixels { size: [width, height], channels: chosen.len(), data })
+}
+
+/// Reads an array of float32 as `numpy.save` writes it (NEP 1): its shape, and its numbers with the last axis fastest.
+pub fn read_npy(path: &Path) -> Result<(Vec<usize>, Vec<f32>)> {
+    let bytes = fs::read(path).map_err(|error| failed(path, error))?;
+    npy_from(&bytes).ok_or_else(|| failed(path, "it is no .npy file of float32 in C order"))
+}
+
+fn npy_from(bytes: &[u8]) -> Option<(Vec<usize>, Vec<f32>)> {
+    let version = *bytes.strip_prefix(b"\x93NUMPY")?.first()?;
+    // The length of the header has two bytes in the first version, four in the others.
+    let start = if version == 1 { 10 } else { 12 };
+    let length = bytes.get(8..start)?.iter().rev().fold(0, |length, byte| length << 8 | usize::from(*byte));
+    let header = std::str::from_utf8(bytes.get(start..start.checked_add(length)?)?).ok()?;
+    if !header.contains("'descr': '<f4'") || !header.contains("'fortran_order': False") {
+        return None;
+    }
+    let (_, shape) = header.split_once("'shape': (")?;
+    let sides = shape.split_once(')')?.0.split(',').map(str::trim).filter(|side| !side.is_empty());
+    let shape: Vec<usize> = sides.map(|side| side.parse().ok()).collect::<Option<_>>()?;
+    let count = shape.iter().try_fold(4usize, |count, side| count.checked_mul(*side))?;
+    let data = bytes.get(start + length..).filter(|data| data.len() == count)?;
+    let numbers = data.chunks_exact(4).map(|v| f32::from_le_bytes([v[0], v[1], v[2], v[3]])).collect();
+    Some((shape, numbers))
 }

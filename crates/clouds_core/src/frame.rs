@@ -343,7 +343,7 @@ impl Frame {
         frame.sun_volume_eye = sun_volume::eye_in(camera.eye, params, time);
         frame.shadow_texel = shadow::texel(frame.altitude);
         frame.shadow_eye = shadow::eye_in(camera.eye, params, time);
-        frame.high_clouds = u32::from(params.high_clouds.coverage > 0.0);
+        frame.high_clouds = u32::from(params.has_high_clouds());
         frame.sun_direction = sun_direction(params).as_vec3().to_array();
         frame.set_high_sun(params);
         frame.droplet = droplet(f64::from(params.light.droplet_diameter)).map(|v| v as f32);
@@ -389,7 +389,7 @@ impl Frame {
 
     /// Whether clouds cast shadows on the ground that `camera` sees.
     pub fn has_ground_shadow(&self, camera: &Camera, params: &Params) -> bool {
-        let clouds = params.has_clouds() || params.high_clouds.coverage > 0.0;
+        let clouds = params.has_clouds() || params.has_high_clouds();
         let air = &params.atmosphere;
         // As far around the planet as the horizon is, the sun stands higher by as much.
         let sine = f64::from(Vec3::from_array(self.zenith).dot(Vec3::from_array(self.sun_direction)));

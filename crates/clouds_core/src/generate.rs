@@ -127,7 +127,10 @@ fn python() -> String {
     out.push_str("    weather_mix : tuple of (Weather, float)\n");
     out.push_str(&wrapped(WEATHER_MIX, "        "));
     out.push_str("    volume : DensityGrid or None\n");
-    out.push_str(&wrapped("A cloud of your own in place of the procedural ones.", "        "));
+    out.push_str(&wrapped(
+        "A cloud of your own in place of all others: high clouds come with it where `high_clouds.with_volume` is True.",
+        "        ",
+    ));
     out.push_str("    \"\"\"\n\n");
     for (name, block) in params.blocks() {
         let ty = block.type_name();

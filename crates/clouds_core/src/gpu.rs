@@ -59,6 +59,19 @@ pub fn check_fork() -> Result<()> {
     }
 }
 
+/// What the environment should hold, by name, before anything loads the driver. It is for programs to set when they start:
+/// it cannot be set safely once there are threads.
+///
+/// Mesa's layer `VK_LAYER_MESA_device_select` asks Wayland for its device and prints an error for each instance where
+/// `XDG_RUNTIME_DIR` is no folder, as on every machine without a screen. It is left out there, unless the user has a say in
+/// it: adapters are chosen here by kind.
+pub fn driver_settings() -> Vec<(&'static str, &'static str)> {
+    let wayland = std::env::var_os("XDG_RUNTIME_DIR").is_some_and(|folder| std::path::Path::new(&folder).is_absolute());
+    let wished = ["NODEVICE_SELECT", "MESA_VK_DEVICE_SELECT", "MESA_VK_DEVICE_SELECT_FORCE_DEFAULT_DEVICE"];
+    let wished = wished.into_iter().any(|name| std::env::var_os(name).is_some());
+    if wayland || wished { Vec::new() } else { vec![("NODEVICE_SELECT", "1")] }
+}
+
 /// The adapters, best first: discrete, integrated, virtual, other, CPU.
 fn enumerate() -> Result<Vec<wgpu::Adapter>> {
     check_fork()?;

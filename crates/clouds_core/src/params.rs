@@ -3,6 +3,7 @@
 //! What a sky looks like is in [`Params`]; how it is computed is in [`Quality`], which never changes the look. The
 //! sources are named as in `docs/sources.md`: nubis2015, thesis2018, vsu2022, gems2001.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use crate::error::{Error, Result};
@@ -265,6 +266,8 @@ params! {
     HighClouds {
         /// How much of the sky they cover: 0 is clear, 1 overcast.
         coverage: f32 = 0.5, in 0..=1 "";
+        /// Whether they are there with a `volume` too, which is otherwise all the cloud that there is.
+        with_volume: bool = false;
         /// Cloud type: 0 cirrus in streaks, 1 altocumulus in cells, and between them both, here more of one, there of the other.
         r#type: f32 = 0.0, in 0..=1 "";
         /// Altitude of the layer.
@@ -577,6 +580,11 @@ impl Params {
         self.volume.is_none() && self.upper_clouds.coverage > 0.0
     }
 
+    /// Whether there are high clouds.
+    pub fn has_high_clouds(&self) -> bool {
+        (self.volume.is_none() || self.high_clouds.with_volume) && self.high_clouds.coverage > 0.0
+    }
+
     /// Whether it can rain.
     pub fn is_rainy(&self) -> bool {
         self.volume.is_none() && self.clouds.coverage > 0.0 && self.clouds.precipitation > 0.0
@@ -832,6 +840,11 @@ pub fn uniform_layout() -> (Vec<(&'static str, &'static str, usize)>, usize) {
 
 /// The words of the `params` uniform.
 pub fn uniform(params: &Params) -> Vec<u32> {
+    // Shaders see by the cover whether there are high clouds.
+    let mut params = Cow::Borrowed(params);
+    if !params.has_high_clouds() {
+        params.to_mut().high_clouds.coverage = 0.0;
+    }
     let mut words = Vec::new();
     for (_, block) in params.blocks() {
         let start = words.len();

@@ -102,7 +102,7 @@ impl Method {
             Self::Path => &[("path", "path")],
         };
         let with = |variant| move |&(pass, entry): &(&'static str, &'static str)| (pass, entry, variant);
-        let high = params.high_clouds.coverage > 0.0;
+        let high = params.has_high_clouds();
         let high = high.then(|| ("high_clouds", high_clouds::kernel(&params.high_clouds)));
         let bakes = high.into_iter().chain(BAKES).map(|(pass, entry)| (pass, entry, Variant::bake()));
         let composite: &[_] = if self.by_cells(frame, quality) { &composite::CELLS } else { &composite::WHOLE };

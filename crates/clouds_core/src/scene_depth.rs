@@ -7,6 +7,9 @@ use crate::gpu::Gpu;
 use crate::kernel::Binding;
 use crate::passes::Bindings;
 
+/// Farthest distance of a scene, m: what is beyond it counts as sky, as infinity does. Five times the diameter of the
+/// largest planet. Rasterizers call the sky 1e10 and more, or the largest f32.
+pub const FARTHEST: f32 = 1e10;
 /// Distance of what is not there, m, and texels of a row (as in scene_depth.wgsl).
 const NO_SCENE: f32 = 1e30;
 const ROW: u32 = 2048;
@@ -14,7 +17,7 @@ const ROW: u32 = 2048;
 /// A scene among the clouds, pixel by pixel.
 #[derive(Clone, Copy, Debug)]
 pub struct SceneDepth<'a> {
-    /// Metres along the ray of each pixel, infinite where there is nothing.
+    /// Metres along the ray of each pixel; beyond [`FARTHEST`], infinity among it, there is nothing.
     pub distance: &'a [f32],
     /// Radiance, red, green and blue of each pixel; without it the picture leaves room for it.
     pub color: Option<&'a [f32]>,
@@ -67,7 +70,8 @@ impl SceneTextures {
     /// Uploads some of its pixels.
     pub fn upload(&self, gpu: &Gpu, scene: &SceneDepth<'_>, pixels: Range<usize>) {
         let texels = |texture: &wgpu::Texture| texture.width() as usize * texture.height() as usize;
-        let mut distance: Vec<f32> = scene.distance[pixels.clone()].iter().map(|v| v.min(NO_SCENE)).collect();
+        let mut distance: Vec<f32> =
+            scene.distance[pixels.clone()].iter().map(|v| if *v > FARTHEST { NO_SCENE } else { *v }).collect();
         distance.resize(texels(&self.depth), NO_SCENE);
         gpu.write_texture(&self.depth, &distance);
         if let Some(color) = scene.color {

@@ -2,6 +2,7 @@
 
 use std::collections::HashSet;
 use std::fmt::Write as _;
+use std::path::Path;
 
 use crate::frame::Frame;
 use crate::params::{self, Params, Quality};
@@ -21,7 +22,7 @@ impl Linked {
     /// appending.
     pub fn new(root: &str) -> Result<Self, String> {
         let mut linked = Self { code: String::new(), lines: Vec::new() };
-        let source = read(root).ok_or_else(|| format!("no shader named {root:?}"))?;
+        let source = read(root).ok_or_else(|| missing(root))?;
         linked.append(root, &source)?;
         Ok(linked)
     }
@@ -40,7 +41,7 @@ impl Linked {
             for (number, line) in source.lines().enumerate() {
                 match line.strip_prefix("#import ") {
                     Some(import) if seen.insert(import.to_owned()) => {
-                        let source = read(import).ok_or_else(|| format!("{file}: no shader named {import:?}"))?;
+                        let source = read(import).ok_or_else(|| format!("{file}: {}", missing(import)))?;
                         queue.push((import.to_owned(), source));
                     }
                     Some(_) => {}
@@ -58,7 +59,10 @@ impl Linked {
     /// The file and line that line `number` of the linked code came from.
     pub fn origin(&self, number: usize) -> String {
         let (file, line) = &self.lines[number - 1];
-        format!("shaders/wgsl/{file}.wgsl:{line}")
+        match std::env::var_os(FOLDER) {
+            Some(folder) => format!("{}:{line}", Path::new(&folder).join(format!("{file}.wgsl")).display()),
+            None => format!("shaders/wgsl/{file}.wgsl:{line}"),
+        }
     }
 
     /// Parses and validates the module; errors name the file and line that the text came from.
@@ -85,12 +89,22 @@ pub fn read(name: &str) -> Option<String> {
     match name {
         "params" => Some(params_source()),
         "frame" => Some(wgsl_struct(&Frame::default())),
-        _ if std::env::var_os("NUBIS_SHADERS").is_some() => {
+        _ => match std::env::var_os(FOLDER) {
             // For work on shaders: read from a folder, without building anything again.
-            let folder = std::env::var_os("NUBIS_SHADERS").unwrap_or_default();
-            std::fs::read_to_string(std::path::Path::new(&folder).join(format!("{name}.wgsl"))).ok()
-        }
-        _ => SHADERS.iter().find(|(file, _)| *file == name).map(|(_, source)| (*source).to_owned()),
+            Some(folder) => std::fs::read_to_string(Path::new(&folder).join(format!("{name}.wgsl"))).ok(),
+            None => SHADERS.iter().find(|(file, _)| *file == name).map(|(_, source)| (*source).to_owned()),
+        },
+    }
+}
+
+/// The environment variable with the folder that shaders are read from.
+const FOLDER: &str = "NUBIS_SHADERS";
+
+/// An error for a file that [`read`] does not find.
+fn missing(name: &str) -> String {
+    match std::env::var_os(FOLDER) {
+        Some(folder) => format!("{FOLDER} = {folder:?} has no file {name}.wgsl that can be read"),
+        None => format!("no shader named {name:?}"),
     }
 }
 

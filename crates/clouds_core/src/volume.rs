@@ -43,7 +43,10 @@ impl DensityGrid {
             let allowed = format!("finite numbers from 0 to {DENSEST} 1/m");
             return Err(Error::parameter("extinction", format!("an array with {bad}"), allowed));
         }
-        if !(low.abs().max(high.abs()).max_element() <= FARTHEST && (high - low).min_element() >= 1e-3) {
+        // The comparison alone would let NaN pass: the largest of NaN and 1 is 1.
+        let finite = low.is_finite() && high.is_finite();
+        let near = low.abs().max(high.abs()).max_element() <= FARTHEST;
+        if !(finite && near && (high - low).min_element() >= 1e-3) {
             return Err(Error::parameter(
                 "bounds",
                 format!("(({}, {}, {}), ({}, {}, {}))", low.x, low.y, low.z, high.x, high.y, high.z),

@@ -436,7 +436,8 @@ impl App {
         let (shown, picture) = still.context("hold still until the picture is at its best, then save it")?;
         let (size, wish) = (shown.screen.size().map(|side| side as usize), &shown.wish);
         let path = self.free_path("sky", "png");
-        files::write_png(&path, &to_srgb8(&picture.image, 4, wish.exposure, wish.tone_map)?, size, 4)?;
+        let pixels = to_srgb8(&picture.image, 4, size[0], wish.exposure, wish.tone_map, true)?;
+        files::write_png(&path, &pixels, size, 4)?;
         files::write_exr(&path.with_extension("exr"), &picture.image, size, 4)?;
         Ok(path)
     }

@@ -62,6 +62,10 @@ fn rate(text: &str) -> Result<f64> {
 }
 
 fn main() -> ExitCode {
+    for (name, value) in clouds_core::gpu::driver_settings() {
+        // SAFETY: there is no other thread yet.
+        unsafe { std::env::set_var(name, value) };
+    }
     #[cfg(debug_assertions)]
     if std::env::var_os("NUBIS_SHADERS").is_none() {
         // SAFETY: there is no other thread yet. Builds for work on the shaders read them from where they are.

@@ -329,7 +329,7 @@ impl<'a> Work<'a> {
             let image = self.moving.animate(camera, params, *time, true, None, &interrupt)?;
             screen.write(self.gpu, &image)?;
             let path = folder.join(format!("frame{:05}.png", self.count));
-            let pixels = color::to_srgb8(&image, 4, wish.exposure, wish.tone_map)?;
+            let pixels = color::to_srgb8(&image, 4, size[0] as usize, wish.exposure, wish.tone_map, true)?;
             files::write_png(&path, &pixels, size.map(|side| side as usize), 4)?;
         } else {
             self.moving.animate_onto(&screen, camera, params, *time, &interrupt)?;
@@ -409,7 +409,7 @@ impl<'a> Work<'a> {
         let image = self.still.render(&camera, &wish.params, wish.time, true, false, None, &interrupt)?.image;
         let size = PANORAMA.map(|side| side as usize);
         files::write_exr(&path, &image, size, 4)?;
-        let pixels = color::to_srgb8(&image, 4, wish.exposure, wish.tone_map)?;
+        let pixels = color::to_srgb8(&image, 4, size[0], wish.exposure, wish.tone_map, true)?;
         files::write_png(&path.with_extension("png"), &pixels, size, 4)?;
         lock(&shared.outbox).written = Some(path);
         (shared.notify)();

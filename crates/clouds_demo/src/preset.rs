@@ -38,8 +38,39 @@ fn scene_from(name: String, scene: Toml) -> Result<(String, Camera, Params)> {
 /// Reads a TOML file; fields left out have their defaults.
 pub fn load(path: &Path) -> Result<Params> {
     let text = std::fs::read_to_string(path).with_context(|| format!("{} cannot be read", path.display()))?;
+    // Editors on Windows begin files with a mark.
+    let text = text.trim_start_matches('\u{feff}');
     let table: Table = text.parse().with_context(|| format!("{} is no TOML file", path.display()))?;
+    let table = with_arrays(Toml::Table(table), path.parent().unwrap_or(Path::new("")))?;
+    let Toml::Table(table) = table else { unreachable!("a table stays one") };
     params_from(table).with_context(|| format!("{} is no sky", path.display()))
+}
+
+/// What Python has saved beside the file (`name.npy`) in its place.
+fn with_arrays(value: Toml, folder: &Path) -> Result<Toml> {
+    fn nested(shape: &[usize], data: &[f32]) -> Toml {
+        match shape {
+            [] => Toml::Float(f64::from(data[0])),
+            [side, rest @ ..] => {
+                let parts = data.chunks((data.len() / side.max(&1)).max(1));
+                Toml::Array(parts.map(|part| nested(rest, part)).collect())
+            }
+        }
+    }
+    Ok(match value {
+        Toml::String(name) if name.ends_with(".npy") => {
+            let (shape, data) = clouds_core::files::read_npy(&folder.join(name))?;
+            nested(&shape, &data)
+        }
+        Toml::Array(parts) if parts.iter().any(Toml::is_table) => {
+            Toml::Array(parts.into_iter().map(|part| with_arrays(part, folder)).collect::<Result<_>>()?)
+        }
+        Toml::Table(fields) => {
+            let fields = fields.into_iter().map(|(name, field)| Ok((name, with_arrays(field, folder)?)));
+            Toml::Table(fields.collect::<Result<_>>()?)
+        }
+        other => other,
+    })
 }
 
 fn params_from(table: Table) -> Result<Params> {
@@ -141,7 +172,7 @@ fn value(given: &Toml) -> Result<Value> {
 
 /// Writes all parameters to a TOML file that the Python package reads too.
 pub fn save(path: &Path, params: &Params) -> Result<()> {
-    std::fs::write(path, to_toml(params)?).with_context(|| format!("{} cannot be written", path.display()))
+    Ok(clouds_core::files::write_bytes(path, to_toml(params)?.as_bytes())?)
 }
 
 fn to_toml(params: &Params) -> Result<String> {

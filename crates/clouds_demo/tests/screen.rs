@@ -38,7 +38,7 @@ fn a_screen_shows_what_memory_gets() {
             let (camera, params, time) = shot(i);
             one.animate_onto(&screen, &camera, &params, time, &|| Ok(())).expect("is painted");
             let image = other.animate(&camera, &params, time, true, None, &|| Ok(())).expect("is made");
-            let expected = to_srgb8(&image, 4, exposure, tone_map).expect("is shown");
+            let expected = to_srgb8(&image, 4, 64, exposure, tone_map, true).expect("is shown");
             let got = read::bytes(&gpu, &screen);
             let most = got.iter().zip(&expected).map(|(a, b)| a.abs_diff(*b)).max();
             assert!(most <= Some(1), "{tone_map}, frame {i}: {most:?} levels");

@@ -8,7 +8,7 @@ use clouds_core::schema::{self, Block, Map, Value};
 use glam::DVec3;
 use numpy::{PyArray1, PyArrayMethods as _, PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods as _};
 use pyo3::prelude::*;
-use pyo3::types::{PyBool, PyBytes, PyDict, PyInt, PyString, PyTuple};
+use pyo3::types::{PyBool, PyBytes, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple};
 
 use crate::{DensityGrid, exception};
 
@@ -17,13 +17,11 @@ pub fn value_from_python(value: &Bound<'_, PyAny>) -> PyResult<Value> {
     if value.is_none() {
         return Ok(Value::None);
     }
-    if let Ok(array) = value.cast::<PyUntypedArray>()
-        && array.ndim() > 1
-    {
-        return map_from_python(value, array);
-    }
     if let Some(value) = plain_from_python(value) {
         return Ok(value);
+    }
+    if is_array(value) {
+        return Ok(array_from_python(value).unwrap_or_else(Value::Text));
     }
     // Text would be a sequence of letters, and bytes one of numbers.
     let parts: Vec<Bound<'_, PyAny>> =
@@ -39,10 +37,20 @@ pub fn value_from_python(value: &Bound<'_, PyAny>) -> PyResult<Value> {
     }
 }
 
+/// Whether a value has axes, or is nested as one that does.
+fn is_array(value: &Bound<'_, PyAny>) -> bool {
+    let nested = || value.get_item(0).is_ok_and(|row| row.cast::<PyString>().is_err() && row.len().is_ok());
+    let sequence = value.cast::<PyList>().is_ok() || value.cast::<PyTuple>().is_ok();
+    if sequence { nested() } else { value.hasattr("ndim").is_ok_and(|has| has) }
+}
+
 /// A switch, a word or a number.
 fn plain_from_python(value: &Bound<'_, PyAny>) -> Option<Value> {
     if let Ok(v) = value.cast::<PyBool>() {
         return Some(Value::Bool(v.is_true()));
+    }
+    if let Ok(v) = value.cast::<PyFloat>() {
+        return Some(Value::Float(v.value()));
     }
     if let Ok(v) = value.cast::<PyString>() {
         return Some(Value::Text(v.to_string_lossy().into_owned()));
@@ -52,41 +60,82 @@ fn plain_from_python(value: &Bound<'_, PyAny>) -> Option<Value> {
         let number = v.extract::<i64>().map(Value::Int).or_else(|_| v.extract::<f64>().map(Value::Float));
         return Some(number.unwrap_or_else(|_| Value::Text(shown(value))));
     }
-    if value.cast::<PyUntypedArray>().is_ok_and(|array| array.ndim() > 0) {
-        return None;
+    if !value.hasattr("dtype").is_ok_and(|has| has) {
+        return value.extract::<f64>().ok().map(Value::Float);
     }
     // NumPy scalars, which are no Python numbers, and arrays without axes.
-    let item = if value.hasattr("dtype").is_ok_and(|has| has) { value.call_method0("item").ok() } else { None };
-    match &item {
-        Some(item) if !item.hasattr("dtype").is_ok_and(|has| has) => plain_from_python(item),
-        _ => value.extract::<f64>().ok().map(Value::Float),
+    match opened(value, &[], "fiub") {
+        Ok(array) if array.getattr("ndim").is_ok_and(|axes| axes.extract::<usize>().is_ok_and(|axes| axes == 0)) => {
+            let item = array.call_method0("item").ok()?;
+            if item.hasattr("dtype").is_ok_and(|has| has) {
+                // A float longer than Python's stays one of NumPy's.
+                return item.extract::<f64>().ok().map(Value::Float);
+            }
+            plain_from_python(&item)
+        }
+        _ => None,
     }
 }
 
 fn shown(value: &Bound<'_, PyAny>) -> String {
-    value.repr().map_or_else(|_| "?".into(), |text| text.to_string_lossy().into_owned())
+    const LONGEST: usize = 200;
+    let text = value.repr().map_or_else(|_| "?".into(), |text| text.to_string_lossy().into_owned());
+    match text.char_indices().nth(LONGEST) {
+        Some((end, _)) => format!("{}...", &text[..end]),
+        None => text,
+    }
 }
 
-fn map_from_python(value: &Bound<'_, PyAny>, array: &Bound<'_, PyUntypedArray>) -> PyResult<Value> {
-    let shape = array.shape().to_vec();
-    let kind: String = array.dtype().getattr("kind")?.extract()?;
+/// A value as the gate for arrays (python/nubis/_arrays.py) reads it, or what it is instead.
+fn opened<'py>(value: &Bound<'py, PyAny>, dims: &[&str], kinds: &str) -> Result<Bound<'py, PyAny>, String> {
+    let py = value.py();
+    let gate = py.import("nubis._arrays").and_then(|module| module.getattr("opened"));
+    gate.and_then(|gate| gate.call1((value, dims, kinds))).map_err(|error| error.value(py).to_string())
+}
+
+/// The argument called `name` as a contiguous array of float64 or float32 and one of some shapes (None: any length), finite.
+pub fn numbers_from_python<'py, T: numpy::Element>(
+    name: &str,
+    value: &Bound<'py, PyAny>,
+    allowed: &str,
+    shapes: &[&[Option<usize>]],
+    dims: &[&str],
+) -> PyResult<PyReadonlyArrayDyn<'py, T>> {
+    let py = value.py();
+    let kwargs = PyDict::new(py);
+    let shapes = shapes.iter().map(|shape| PyTuple::new(py, *shape)).collect::<PyResult<Vec<_>>>()?;
+    kwargs.set_item("shapes", shapes)?;
+    kwargs.set_item("dims", dims)?;
+    kwargs.set_item("dtype", T::get_dtype(py))?;
+    let gate = py.import("nubis._arrays")?.getattr("numbers")?;
+    gate.call((name, value, allowed), Some(&kwargs))?.extract()
+}
+
+/// A vector, or a map; what it is instead where it is neither.
+fn array_from_python(value: &Bound<'_, PyAny>) -> Result<Value, String> {
+    let array = opened(value, &["y", "x"], "fiu")?;
+    let failed = |error: PyErr| error.value(value.py()).to_string();
+    let shape = array.cast::<PyUntypedArray>().map_err(|error| error.to_string())?.shape().to_vec();
+    let read = |dtype: &str| {
+        let numpy = value.py().import("numpy")?;
+        numpy.call_method1("ascontiguousarray", (&array, dtype))
+    };
     let channels = match shape[..] {
+        [_] => {
+            let numbers: PyReadonlyArrayDyn<'_, f64> =
+                read("float64").and_then(|array| array.extract()).map_err(failed)?;
+            return Ok(Value::Vector(numbers.as_slice().map_err(|error| error.to_string())?.to_vec()));
+        }
         [_, _] => 1,
-        [_, _, channels] => channels,
-        _ => 0,
+        [_, _, channels] if channels > 0 => channels,
+        _ => return Err(format!("array of shape {shape:?}")),
     };
-    if channels == 0 || !"fiu".contains(&kind) {
-        return Ok(Value::Text(format!("array of shape {shape:?} and dtype {}", array.dtype())));
-    }
-    let kwargs = PyDict::new(value.py());
-    kwargs.set_item("dtype", "float32")?;
     // Where warnings are errors, numbers that f32 does not hold are one.
-    let numpy = value.py().import("numpy")?;
-    let Ok(numbers) = numpy.call_method("ascontiguousarray", (value,), Some(&kwargs)) else {
-        return Ok(Value::Text(format!("array of shape {shape:?} with numbers beyond float32")));
+    let Ok(numbers) = read("float32") else {
+        return Err(format!("array of shape {shape:?} with numbers beyond float32"));
     };
-    let numbers: PyReadonlyArrayDyn<'_, f32> = numbers.extract()?;
-    let data = numbers.as_slice()?.to_vec();
+    let numbers: PyReadonlyArrayDyn<'_, f32> = numbers.extract().map_err(|error| format!("{error}"))?;
+    let data = numbers.as_slice().map_err(|error| error.to_string())?.to_vec();
     Ok(Value::Map(Arc::new(Map { width: shape[1], height: shape[0], channels, data })))
 }
 

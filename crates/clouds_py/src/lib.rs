@@ -1,6 +1,7 @@
 //! `nubis._nubis`: the renderer for Python. Thin: it turns Python values into the core's and back.
 
 mod convert;
+mod exit;
 
 use std::cell::RefCell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -21,7 +22,8 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString, PyTuple};
 
 use convert::{
-    number_from_python, params_from_python, quality_from_python, value_from_python, value_to_python, vector_from_python,
+    number_from_python, numbers_from_python, params_from_python, quality_from_python, value_from_python,
+    value_to_python, vector_from_python,
 };
 
 /// The exception of the package that an error of the core becomes.
@@ -43,12 +45,24 @@ fn raise<T>(py: Python<'_>, result: Result<T>) -> PyResult<T> {
     result.map_err(|error| exception(py, &error))
 }
 
-/// Runs `work` without the GIL. It is handed a check for Ctrl-C; no panic leaves it.
+/// Runs `work` without the GIL.
+fn unlocked<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> T {
+    let _inside = exit::enter(py);
+    let result = py.detach(work);
+    exit::stay_if_closing(py);
+    result
+}
+
+/// Runs `work` without the GIL. It is handed a check for Ctrl-C and the end of the interpreter; no panic leaves it.
 fn detached<T: Send>(py: Python<'_>, work: impl FnOnce(gpu::Interrupt<'_>) -> Result<T> + Send) -> PyResult<T> {
-    let (result, interrupt) = py.detach(|| {
+    let (result, interrupt) = unlocked(py, || {
         let raised = RefCell::new(None);
         let interrupt = || {
-            Python::attach(|py| py.check_signals()).map_err(|error| {
+            if exit::is_closing() {
+                return Err(Error::Interrupted);
+            }
+            // None at the end of the interpreter.
+            Python::try_attach(|py| py.check_signals()).unwrap_or(Ok(())).map_err(|error| {
                 *raised.borrow_mut() = Some(error);
                 Error::Interrupted
             })
@@ -131,10 +145,11 @@ impl Camera {
         convention: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let py = world_from_camera.py();
-        let rows = world_from_camera.extract::<[[f64; 4]; 4]>().map_err(|_| {
-            let given = world_from_camera.str().map_or_else(|_| "?".into(), |text| text.to_string());
-            exception(py, &Error::parameter("world_from_camera", given, "a 4 x 4 matrix of numbers"))
-        })?;
+        let _inside = exit::enter(py);
+        let (shape, allowed) = ([Some(4); 2], "a 4 x 4 matrix of finite numbers");
+        let matrix = numbers_from_python("world_from_camera", world_from_camera, allowed, &[&shape], &[])?;
+        let numbers = matrix.as_slice()?;
+        let rows = std::array::from_fn(|row| std::array::from_fn(|column| numbers[4 * row + column]));
         let convention = match convention.map_or(Ok(Value::Text("opengl".into())), value_from_python)? {
             Value::Text(word) if word == "opengl" => Convention::OpenGl,
             Value::Text(word) if word == "opencv" => Convention::OpenCv,
@@ -275,24 +290,15 @@ impl DensityGrid {
     #[new]
     fn new(extinction: &Bound<'_, PyAny>, bounds: &Bound<'_, PyAny>) -> PyResult<Self> {
         let py = extinction.py();
-        let kwargs = PyDict::new(py);
-        kwargs.set_item("dtype", "float32")?;
-        let refuse = |what: String| {
-            let allowed = "an array of numbers of shape (nz, ny, nx), each from 1 to 2048";
-            exception(py, &Error::parameter("extinction", what, allowed))
+        let _inside = exit::enter(py);
+        let allowed = "an array of numbers of shape (nz, ny, nx), each from 1 to 2048";
+        let array = numbers_from_python("extinction", extinction, allowed, &[&[None; 3]], &["z", "y", "x"])?;
+        let allowed = "two corners of finite numbers: ((x0, y0, z0), (x1, y1, z1))";
+        let corners = numbers_from_python::<f64>("bounds", bounds, allowed, &[&[Some(2), Some(3)]], &[])?;
+        let (&[nz, ny, nx], &[x0, y0, z0, x1, y1, z1]) = (array.shape(), corners.as_slice()?) else {
+            unreachable!("the shapes are checked");
         };
-        let array = py
-            .import("numpy")?
-            .call_method("ascontiguousarray", (extinction,), Some(&kwargs))
-            .map_err(|error| refuse(error.value(py).to_string()))?;
-        let array: PyReadonlyArrayDyn<'_, f32> = array.extract()?;
-        let &[nz, ny, nx] = array.shape() else {
-            return Err(refuse(format!("an array of shape {:?}", array.shape())));
-        };
-        let [low, high] = bounds.extract::<[[f64; 3]; 2]>().map_err(|_| {
-            let given = bounds.str().map_or_else(|_| "?".into(), |text| text.to_string());
-            exception(py, &Error::parameter("bounds", given, "two corners: ((x0, y0, z0), (x1, y1, z1))"))
-        })?;
+        let (low, high) = ([x0, y0, z0], [x1, y1, z1]);
         let grid = CoreGrid::new([nx, ny, nz], array.as_slice()?.to_vec(), vector(low), vector(high));
         Ok(Self(Arc::new(raise(py, grid)?)))
     }
@@ -355,25 +361,11 @@ fn array<'py, T: numpy::Element>(py: Python<'py>, data: Vec<T>, shape: &[usize])
 
 /// World points of shape (N, 3) from any array-like.
 fn points_from_python(py: Python<'_>, points: &Bound<'_, PyAny>) -> PyResult<Vec<[f64; 3]>> {
-    let numpy = py.import("numpy")?;
     let allowed = "an array of finite numbers of shape (N, 3), world metres within 2e8 of the origin";
-    let refuse = |what: String| exception(py, &Error::parameter("points", what, allowed));
-    // Text and complex numbers could be made floats too.
-    let points = numpy.call_method1("asarray", (points,)).map_err(|error| refuse(error.value(py).to_string()))?;
-    let kind: String = points.getattr("dtype")?.getattr("kind")?.extract()?;
-    if !"fiu".contains(&kind) {
-        return Err(refuse(format!("an array of dtype {}", points.getattr("dtype")?)));
-    }
-    let points = numpy
-        .call_method1("ascontiguousarray", (points, "float64"))
-        .map_err(|error| refuse(error.value(py).to_string()))?;
-    let points: PyReadonlyArrayDyn<'_, f64> = points.extract()?;
-    if points.shape().len() != 2 || points.shape()[1] != 3 {
-        return Err(refuse(format!("an array of shape {:?}", points.shape())));
-    }
+    let points = numbers_from_python::<f64>("points", points, allowed, &[&[None, Some(3)], &[Some(0), Some(3)]], &[])?;
     let numbers = points.as_slice()?;
-    if let Some(bad) = numbers.iter().find(|v| v.is_nan() || v.abs() > 2e8) {
-        return Err(refuse(format!("an array with {bad}")));
+    if let Some(bad) = numbers.iter().find(|v| v.abs() > 2e8) {
+        return Err(exception(py, &Error::parameter("points", format!("an array with {bad}"), allowed)));
     }
     Ok(numbers.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect())
 }
@@ -428,6 +420,7 @@ impl Renderer {
         scene_depth: Option<PyReadonlyArrayDyn<'py, f32>>,
         scene_color: Option<PyReadonlyArrayDyn<'py, f32>>,
     ) -> PyResult<Bound<'py, PyAny>> {
+        let _inside = exit::enter(py);
         let params: Params = params_from_python(params)?;
         let scene = scene_from_python(scene_depth.as_ref(), scene_color.as_ref())?;
         let picture = detached(py, |interrupt| {
@@ -444,6 +437,7 @@ impl Renderer {
         time: f64,
         scene_depth: Option<PyReadonlyArrayDyn<'py, f32>>,
     ) -> PyResult<Bound<'py, PyTuple>> {
+        let _inside = exit::enter(py);
         let params: Params = params_from_python(params)?;
         let scene = scene_from_python(scene_depth.as_ref(), None)?;
         let picture =
@@ -470,6 +464,7 @@ impl Renderer {
         scene_depth: Option<PyReadonlyArrayDyn<'py, f32>>,
         scene_color: Option<PyReadonlyArrayDyn<'py, f32>>,
     ) -> PyResult<Bound<'py, PyAny>> {
+        let _inside = exit::enter(py);
         let params: Params = params_from_python(params)?;
         let scene = scene_from_python(scene_depth.as_ref(), scene_color.as_ref())?;
         let image =
@@ -478,7 +473,7 @@ impl Renderer {
     }
 
     fn cut(&self, py: Python<'_>) {
-        py.detach(|| lock(&self.core).cut());
+        unlocked(py, || lock(&self.core).cut());
     }
 
     fn history_length<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
@@ -493,6 +488,7 @@ impl Renderer {
         params: &Bound<'_, PyAny>,
         time: f64,
     ) -> PyResult<Bound<'py, PyArray1<f32>>> {
+        let _inside = exit::enter(py);
         let points = points_from_python(py, points)?;
         let params: Params = params_from_python(params)?;
         let answers = detached(py, |interrupt| lock(&self.core).density(&points, &params, time, interrupt))?;
@@ -506,6 +502,7 @@ impl Renderer {
         params: &Bound<'_, PyAny>,
         time: f64,
     ) -> PyResult<Bound<'py, PyArray1<f32>>> {
+        let _inside = exit::enter(py);
         let points = points_from_python(py, points)?;
         let params: Params = params_from_python(params)?;
         let answers = detached(py, |interrupt| lock(&self.core).sun_transmittance(&points, &params, time, interrupt))?;
@@ -520,6 +517,7 @@ impl Renderer {
         params: &Bound<'_, PyAny>,
         time: f64,
     ) -> PyResult<Bound<'py, PyArray1<f32>>> {
+        let _inside = exit::enter(py);
         let directions = points_from_python(py, directions)?;
         let params: Params = params_from_python(params)?;
         let answers = detached(py, |interrupt| {
@@ -539,6 +537,7 @@ impl Renderer {
         extent: f64,
         size: u32,
     ) -> PyResult<Bound<'py, PyAny>> {
+        let _inside = exit::enter(py);
         let params: Params = params_from_python(params)?;
         let map = detached(py, |interrupt| {
             lock(&self.core).shadow_map(&params, time, center, altitude, extent, size, interrupt)
@@ -547,6 +546,7 @@ impl Renderer {
     }
 
     fn weather_map<'py>(&self, py: Python<'py>, params: &Bound<'_, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        let _inside = exit::enter(py);
         let params: Params = params_from_python(params)?;
         let ([width, height], texels) = detached(py, |interrupt| lock(&self.core).weather_map(&params, interrupt))?;
         array(py, texels, &[height as usize, width as usize, 3])
@@ -561,6 +561,7 @@ impl Renderer {
         params: &Bound<'_, PyAny>,
         time: f64,
     ) -> PyResult<Bound<'py, PyAny>> {
+        let _inside = exit::enter(py);
         let params: Params = params_from_python(params)?;
         let answers =
             detached(py, |interrupt| lock(&self.core).probe(&imports, expression, &inputs, &params, time, interrupt))?;
@@ -569,15 +570,15 @@ impl Renderer {
     }
 
     fn timings(&self, py: Python<'_>) -> Vec<(String, f64)> {
-        py.detach(|| lock(&self.core).timings.0.clone())
+        unlocked(py, || lock(&self.core).timings.0.clone())
     }
 
     fn memory(&self, py: Python<'_>) -> Vec<(&'static str, &'static str, u64)> {
-        py.detach(|| lock(&self.core).memory())
+        unlocked(py, || lock(&self.core).memory())
     }
 
     fn adapter<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let info = py.detach(|| lock(&self.core).gpu().info.clone());
+        let info = unlocked(py, || lock(&self.core).gpu().info.clone());
         adapter_to_python(py, &info)
     }
 }
@@ -607,6 +608,7 @@ fn check<'py>(
     name: &str,
     value: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyAny>> {
+    let _inside = exit::enter(py);
     let block = params::block(type_name).expect("the classes are generated from the blocks");
     let field = block.fields().iter().find(|field| field.name == name).expect("so are their fields");
     let value = raise(py, field.check(path, &value_from_python(value)?))?;
@@ -617,11 +619,13 @@ fn check<'py>(
 #[pyfunction]
 fn check_params(params: &Bound<'_, PyAny>) -> PyResult<()> {
     let py = params.py();
+    let _inside = exit::enter(py);
     raise(py, params_from_python(params)?.check())
 }
 
 #[pyfunction]
 fn check_quality(quality: &Bound<'_, PyAny>) -> PyResult<()> {
+    let _inside = exit::enter(quality.py());
     raise(quality.py(), quality_from_python(quality)?.check())
 }
 
@@ -694,9 +698,11 @@ fn to_srgb8<'py>(
     frame: PyReadonlyArrayDyn<'py, f32>,
     exposure: f32,
     tonemap: &Bound<'py, PyString>,
+    dither: bool,
 ) -> PyResult<Bound<'py, PyAny>> {
     let shape = frame.shape().to_vec();
-    let pixels = raise(py, color::to_srgb8(frame.as_slice()?, shape[2], exposure, &tonemap.to_string_lossy()))?;
+    let (pixels, tone_map) = (frame.as_slice()?, tonemap.to_string_lossy());
+    let pixels = raise(py, color::to_srgb8(pixels, shape[2], shape[1], exposure, &tone_map, dither))?;
     array(py, pixels, &shape)
 }
 
@@ -724,6 +730,18 @@ fn write_hdr(py: Python<'_>, path: PathBuf, frame: PyReadonlyArrayDyn<'_, f32>) 
     raise(py, files::write_hdr(&path, frame.as_slice()?, [shape[1], shape[0]], shape[2]))
 }
 
+/// Writes a file that takes the place of another when it is whole.
+#[pyfunction]
+fn write_bytes(py: Python<'_>, path: PathBuf, bytes: &[u8]) -> PyResult<()> {
+    raise(py, files::write_bytes(&path, bytes))
+}
+
+/// `FileError` where a file cannot be written.
+#[pyfunction]
+fn check_target(py: Python<'_>, path: PathBuf) -> PyResult<()> {
+    raise(py, files::check_target(&path))
+}
+
 /// The numbers in a PNG, HDR or EXR file.
 #[pyfunction]
 fn read_pixels(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyAny>> {
@@ -742,12 +760,20 @@ fn clear_cache(py: Python<'_>) -> PyResult<()> {
     raise(py, cache::clear())
 }
 
+/// What the environment should hold before the driver is loaded: name and value.
+#[pyfunction]
+fn driver_settings() -> Vec<(&'static str, &'static str)> {
+    gpu::driver_settings()
+}
+
 #[pymodule]
 mod _nubis {
     #[pymodule_export]
+    use super::exit::{close, forked};
+    #[pymodule_export]
     use super::{
         Camera, DensityGrid, Renderer, adapters, auto_exposure, cache_usage, carried, carried_between, check,
-        check_params, check_quality, clear_cache, drift_after, drift_of, number, quality, read_pixels, same_winds,
-        to_srgb8, write_exr, write_hdr, write_png,
+        check_params, check_quality, check_target, clear_cache, drift_after, drift_of, driver_settings, number, quality,
+        read_pixels, same_winds, to_srgb8, write_bytes, write_exr, write_hdr, write_png,
     };
 }

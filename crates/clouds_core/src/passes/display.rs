@@ -58,7 +58,10 @@ impl Screen {
 
     /// Shows a picture from memory: four numbers a pixel, row by row.
     pub fn write(&self, gpu: &Gpu, image: &[f32]) -> Result<()> {
-        self.write_pixels(gpu, &to_srgb8(image, 4, self.exposure, self.tone_map)?)
+        let width = self.size()[0] as usize;
+        // Without alpha, as the pass shows it: a window has nothing behind.
+        let image: Vec<f32> = image.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2], 1.0]).collect();
+        self.write_pixels(gpu, &to_srgb8(&image, 4, width, self.exposure, self.tone_map, true)?)
     }
 
     /// Shows pixels from memory as they are: four bytes each, row by row.

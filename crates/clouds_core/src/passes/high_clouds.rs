@@ -31,7 +31,7 @@ impl HighClouds {
         let high = &params.high_clouds;
         let updates = [frame.high_age, frame.high_age_small, frame.high_update, frame.high_update_small];
         // A sky without high clouds reads no texture, but a kernel that could must be given one.
-        let size = if high.coverage > 0.0 { high.texture_size } else { 1 };
+        let size = if params.has_high_clouds() { high.texture_size } else { 1 };
         let key = (high.seed, high.octaves, high.stretch, high.r#type, size, updates);
         let view = self.map.get(key, || {
             // One channel: with four, three of them for nothing, it drops out of the cache of a core (reading it took

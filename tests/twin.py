@@ -69,7 +69,7 @@ def pixel_directions(camera, width, height):
 def shell(params):
     """The lowest and the highest altitude at which there can be anything."""
     clouds, deck = params.clouds, params.upper_clouds
-    top = max(clouds.top, clouds.cumulonimbus_top if clouds.precipitation > 0.2 else 0.0)
+    top = max(clouds.top, clouds.cumulonimbus_top if clouds.precipitation > 0 else 0.0)
     lowest = 0.0 if clouds.rain_extinction > 0 else clouds.base
     return lowest, max(top, deck.top if deck.coverage > 0 else 0.0)
 

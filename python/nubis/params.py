@@ -498,15 +498,15 @@ class Quality(Block):
         How far a ray may leap through clear air, beyond `big_step`: as a share of
         `clouds.shape_scale` (of `weather.scale` or two and a half pixels of `weather.map`, if that
         is less) for each unit that the base shape lacks of being cloud. On a hit the march goes
-        back. 0 leaps no farther than `big_step`; none does where that is 1, in grids and with rain
-        in sight. Allowed: a number from 0 to 1.
+        back. 0 leaps no farther than `big_step`; none does where that is 1, in grids and in rain.
+        Allowed: a number from 0 to 1.
     empty_samples : int
         Full samples of zero in a row after which samples are cheap again (nubis2015: 6). Allowed: a
         whole number from 1 to 4096.
     light_steps : int
         Light samples toward the sun, besides the far one. Where they spread to the end of the
-        clouds, a third of them is for a second deck above the point. Allowed: a whole number from 1
-        to 128.
+        clouds, there is a third more for a second deck above the point. Allowed: a whole number
+        from 1 to 128.
     light_share : float
         Share of a pixel's cloud that is lit as one, by the light samples of one place in it:
         samples in a row are lit together once they have gathered more. 0 lights each sample by

@@ -115,9 +115,12 @@ fn cloud_column(p: vec3f, altitude: f32) -> Column {
     if UPPER {
         // Within the height of that deck where there is nothing, too: the march reads how much it lacks of being cloud.
         let upper = upper_cloud_at(p, altitude, broad);
-        if upper.limit > column.limit || (column.limit <= 0.0 && upper.height > 0.0 && upper.height < 1.0) {
-            return upper;
+        let alone = altitude > frame.lower_top && upper.height > 0.0 && upper.height < 1.0;
+        if upper.limit > column.limit || (column.limit <= 0.0 && alone) {
+            column = upper;
         }
+        // Of a deck that hardly shows there is what the shell has room for (`shell` in params.rs).
+        column.limit = select(0.0, column.limit, altitude >= frame.shell_base && altitude <= frame.shell_top);
     }
     return column;
 }
@@ -167,11 +170,6 @@ fn cloud_top(rain: f32) -> f32 {
 
 fn tallest() -> f32 {
     return max(params.clouds.top, params.clouds.cumulonimbus_top);
-}
-
-// Altitude above which nothing of the first deck is.
-fn lower_top() -> f32 {
-    return select(params.clouds.top, tallest(), RAINY);
 }
 
 // Between which heights of the whole cloud its anvil rises to full strength and falls back.
@@ -238,7 +236,7 @@ const RAIN_STRETCH = 12.0;
 // Rain below the base, thinned by the air that it falls through.
 fn rain_below(weather: LocalWeather, at: vec2f, altitude: f32) -> Column {
     let height = altitude / params.clouds.base;
-    let wet = weather.precipitation * weather.coverage;
+    let wet = frame.rain_reach * weather.precipitation * weather.coverage;
     let limit = select(0.0, saturate(2.0 * wet - 0.6 + 0.6 * height), altitude > 0.0);
     let streak = vec3f(at, altitude / RAIN_STRETCH + frame.rain_fall);
     // All of the cloud is above it.
@@ -298,7 +296,7 @@ fn cloud_density(column: Column, shape: f32, width: f32) -> f32 {
 // which a cloud that is near has nothing finer than the detail's texels of 13 m (passes/noise). One read for both: with two,
 // the march of `fair_weather` took a seventh longer.
 fn detail_at(at: vec3f, tiles: f32) -> f32 {
-    let texels = tiles * 32.0 * select(1.0, FINER, FINE_DETAIL);
+    let texels = tiles * 32.0 * FINER;
     return textureSampleLevel(detail_noise, repeat_sampler, at, log2(max(texels, 1.0))).r;
 }
 

@@ -82,7 +82,7 @@ fn finest_feature() -> f32 {
     if VOLUME {
         return 1e30;
     }
-    let detail = params.clouds.detail_scale / select(32.0, 32.0 * FINER / 2.5, FINE_DETAIL);
+    let detail = params.clouds.detail_scale / (32.0 * FINER / 2.5);
     let noise = min(params.clouds.shape_scale / 128.0, detail);
     return min(select(1.0, min(params.upper_clouds.scale, 1.0), UPPER) * noise, thinnest_deck() / 128.0);
 }

@@ -130,6 +130,12 @@ params! {
         shell_base: f32 = 0.0;
         /// Highest.
         shell_top: f32 = 1.0;
+        /// Highest altitude of the first deck, m.
+        lower_top: f32 = 1.0;
+        /// How much the second deck shows, 0 where its cover is 0.
+        upper_shown: f32 = 0.0;
+        /// How far rain falls, as a share of its way to the ground.
+        rain_reach: f32 = 0.0;
 
         /// The shortest of the scales by which the base shape varies: of what `quality.leap` is a share, m.
         leap_scale: f32 = 1.0;
@@ -311,17 +317,14 @@ fn highest(params: &Params) -> f64 {
 }
 
 /// The distance between features of the noise and of each weather; so short where the cover may go from nothing to all of it
-/// within a texel of the user's map, or half the radius of the spot to keep clear, that leaps by a fifth of it reach half a
-/// texel, a quarter of that radius. Measured, islands of a texel: a whole one loses half as many again as big steps do.
+/// within a texel of the user's map that leaps by a fifth of it reach half a texel. Measured, islands of a texel: a whole one
+/// loses half as many again as big steps do.
 fn leap_scale(params: &Params) -> f32 {
     let of_weather = |(weather, _): (params::Weather, f32)| match &weather.map {
         Some(map) => 2.5 * weather.extent / map.width.max(map.height) as f32,
         None => weather.scale,
     };
-    let clear = params.clear_spot().1 as f32;
-    let clear = if clear > 0.0 { 1.25 * clear } else { f32::INFINITY };
-    let scale = params.weather_shares().into_iter().map(of_weather).fold(params.clouds.shape_scale, f32::min);
-    scale.min(clear)
+    params.weather_shares().into_iter().map(of_weather).fold(params.clouds.shape_scale, f32::min)
 }
 
 impl Frame {
@@ -484,6 +487,9 @@ impl Frame {
         // An eye under the ground is on it: were the ground to hide nothing from there, it would vanish at z = 0.
         self.power_ground = power(0.0).max(0.0);
         [self.shell_base, self.shell_top] = params.shell();
+        self.lower_top = params.lower_top();
+        self.upper_shown = params.upper_shown();
+        self.rain_reach = params.rain_reach();
         self.power_base = power(f64::from(self.shell_base));
         self.power_top = power(f64::from(self.shell_top));
         // The air that they shade: from where the eye is nearest to it to where the last of it goes under the horizon.
@@ -501,7 +507,10 @@ impl Frame {
             let upper = if params.has_upper_clouds() { params.upper_clouds.extinction } else { 0.0 };
             let rain = if params.has_rain_shafts() { params.clouds.rain_extinction } else { 0.0 };
             self.extinction = params.clouds.extinction.max(upper).max(rain);
-            let share = |extinction| if self.extinction > 0.0 { extinction / self.extinction } else { 0.0 };
+            // No share of what is there is 0: that it is thin does not change where it is marched.
+            const LEAST: f32 = 1e-20;
+            let share =
+                |extinction| if self.extinction > 0.0 { f32::max(extinction / self.extinction, LEAST) } else { 0.0 };
             [self.share, self.upper_share, self.rain_share] = [params.clouds.extinction, upper, rain].map(share);
             return;
         };
@@ -556,7 +565,7 @@ impl Frame {
         self.broad_origin = plane(DVec2::new(weather.x + broad, broad - weather.y), params.weather.broad_extent);
         let shares = params.broad_shares();
         self.broad_most = 0.5 * shares.total;
-        self.broad_scale = shares.scale();
+        self.broad_scale = shares.total;
         self.broad_bend = broad_weather::BEND * shares.bend * self.broad_scale;
         let ways = f64::from(broad_weather::BEND * params.weather.extent / params.weather.broad_extent);
         self.broad_stretch = (ways * broad_weather::STEEPEST) as f32;

@@ -79,8 +79,6 @@ pub(crate) struct Variant {
     pub rain_shafts: bool,
     /// Whether there is a second deck.
     pub upper: bool,
-    /// Whether a finer detail is added to the detail.
-    pub fine_detail: bool,
     /// Whether a larger map shifts the weather.
     pub broad: bool,
     /// Whether the profile by height is the user's table.
@@ -129,7 +127,6 @@ impl Variant {
             rainy: params.is_rainy(),
             rain_shafts: params.has_rain_shafts(),
             upper: params.has_upper_clouds(),
-            fine_detail: params.clouds.fine_detail > 0.0,
             broad: params.has_broad_weather(),
             profile_table: params.clouds.profile.is_some() && params.volume.is_none(),
             beams: false,
@@ -168,7 +165,7 @@ impl Variant {
         }
     }
 
-    fn constants(self) -> [(&'static str, f64); 28] {
+    fn constants(self) -> [(&'static str, f64); 27] {
         let switch = |on| f64::from(u8::from(on));
         [
             ("MODEL", f64::from(self.model as u32)),
@@ -182,7 +179,6 @@ impl Variant {
             ("RAINY", switch(self.rainy)),
             ("RAIN_SHAFTS", switch(self.rain_shafts)),
             ("UPPER", switch(self.upper)),
-            ("FINE_DETAIL", switch(self.fine_detail)),
             ("BROAD_WEATHER", switch(self.broad)),
             ("PROFILE_TABLE", switch(self.profile_table)),
             ("BEAMS", switch(self.beams)),

@@ -36,6 +36,9 @@ fn march_list(
     cloud_span[index] = march_cell(index, known);
 }
 
+// The weight up to which a ray has met nothing: of decks without extinction (`LEAST` in frame.rs).
+const NOTHING = 1e-15;
+
 const EVERYWHERE = vec2f(0.0, 1e30);
 const NOWHERE = vec2f(1e30, 0.0);
 
@@ -92,7 +95,7 @@ fn ray_steps(start: f32, length: f32, direction: vec3f) -> Steps {
     // it gets up to twice the steps, or its far clouds are grain.
     let reach = log(1.0 + growth * length);
     // So does one through two decks: with as many steps as through one, those of `two_decks` err by a half more.
-    let decks = select(1.0, TWO_DECKS, UPPER && growth > 0.0);
+    let decks = select(1.0, mix(1.0, TWO_DECKS, frame.upper_shown), UPPER && growth > 0.0);
     let steps = round(count * clamp(decks * sqrt(reach), 1.0, 2.0));
     let each = reach / steps;
     // exp(each) - 1 with all its digits.
@@ -192,10 +195,10 @@ fn ray_leaps(direction: vec3f, medium: u32) -> Leaps {
 
 // The steps from a point without cloud to where to look next: `big_step` of them, or more the more the shape lacks, as the
 // noise changes no faster than so much in a metre (Hart 1996, "sphere tracing", with a slope that is measured, not a bound).
-// Its threshold is what the profile lets through, here and, with none, at any height. Not where another medium may be.
+// Its threshold is what the profile lets through, here and, with none, at any height. Not to where another medium may be.
 fn steps_to_next(steps: Steps, direction: vec3f, column: Column, noise: f32, at: Sample) -> u32 {
     let big = f32(quality.big_step);
-    if VOLUME || RAIN_SHAFTS {
+    if VOLUME {
         return quality.big_step;
     }
     let leaps = ray_leaps(direction, column.medium);
@@ -204,22 +207,44 @@ fn steps_to_next(steps: Steps, direction: vec3f, column: Column, noise: f32, at:
     if UPPER {
         way = way_to_decks(direction, way, at);
     }
+    if RAIN_SHAFTS {
+        way = min(way, way_to_rain(direction, at));
+    }
+    if KEEP_CLEAR {
+        way = min(way, way_to_rim(direction, at));
+    }
     return u32(clamp(steps_over(steps, way, at.length), big, 1.0 + LONGEST_LEAP * (big - 1.0)));
+}
+
+// Rays bend away from the ground: by less than this within a leap.
+const BEND_OF_LEAP = 1e-3;
+
+// No leap goes into the rain, nor any in it.
+fn way_to_rain(direction: vec3f, at: Sample) -> f32 {
+    let mu = cos_zenith_along(direction, at.t, at.altitude);
+    let over = max(at.altitude - params.clouds.base, 0.0);
+    return select(over / (abs(mu) + BEND_OF_LEAP), 1e30, mu > 0.0 && over > 0.0);
+}
+
+// Where a spot is kept clear there is no more than without it, and leaps from outside hold; within it, to where the cover
+// begins, and in its rim none.
+fn way_to_rim(direction: vec3f, at: Sample) -> f32 {
+    let away = length(at.p.xy - frame.clear_at);
+    let within = max(frame.clear_radius - away, 0.0) / max(length(direction.xy), 1e-3);
+    return select(within, 1e30, away >= 1.5 * frame.clear_radius);
 }
 
 // A leap within a deck, no farther than to the other one; between both, all the way there.
 fn way_to_decks(direction: vec3f, leap: f32, at: Sample) -> f32 {
-    let over = at.altitude - lower_top();
+    let over = at.altitude - frame.lower_top;
     let under = params.upper_clouds.base - at.altitude;
-    // Rays bend away from the ground: by less than this within a leap.
-    const BEND_OF_LEAP = 1e-3;
     let mu = cos_zenith_along(direction, at.t, at.altitude);
     let way = max(select(over, under, mu > 0.0), 0.0) / (abs(mu) + BEND_OF_LEAP);
     if over > 0.0 && under > 0.0 {
         return way;
     }
-    // Towers may reach into the deck above: there neither is alone.
-    let alone = select(leap, 0.0, over <= 0.0 && under <= 0.0);
+    // Towers may reach into the deck above: there neither is alone, as soon as that shows.
+    let alone = leap * select(1.0, 1.0 - frame.upper_shown, over <= 0.0 && under <= 0.0);
     return select(alone, min(alone, way), way > 0.0);
 }
 
@@ -339,7 +364,7 @@ fn march_ray(direction: vec3f, limit: f32, offset: f32, within: vec2f) -> Cloud 
         }
     }
     let weight = gathered_weight(sum);
-    if weight <= 0.0 {
+    if weight <= NOTHING {
         return Cloud(vec3f(0.0), 1.0, -1.0, NOWHERE);
     }
 

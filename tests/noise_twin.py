@@ -336,7 +336,7 @@ def high_thickness(values, high):
 
 
 def high_clouds(points, params, time):
-    """Thickness of the high clouds at world points (N, 2), of the thickest, and how much thicker
+    """Thickness of the high clouds at places on the chart (N, 2), of the thickest, and how much thicker
     they are than 0.02 tiles nearer to the sun.
     """
     high = params.high_clouds
@@ -519,7 +519,9 @@ class Field:
     def extinction(self, points):
         """In 1/m."""
         clouds, deck = self.params.clouds, self.params.upper_clouds
-        altitude = twin.altitude(points, float(f32(self.params.atmosphere.planet_radius)))
+        radius = float(f32(self.params.atmosphere.planet_radius))
+        altitude = twin.altitude(points, radius)
+        points = twin.on_chart(points, radius)
         limit, density = self.lower(points, altitude)
         extinction = density * f32(clouds.extinction)
         if clouds.rain_extinction > 0:

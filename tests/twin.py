@@ -34,6 +34,15 @@ def altitude(points, radius):
     return np.linalg.norm(from_centre(points, radius), axis=-1) - radius
 
 
+def on_chart(points, radius):
+    """Where points lie on a map: seen from the antipode of the origin, on the plane that touches
+    the planet there.
+    """
+    up = from_centre(points, radius)
+    on_sphere = up / np.linalg.norm(up, axis=-1, keepdims=True) * radius
+    return on_sphere[..., :2] * (2 * radius / (on_sphere[..., 2:] + radius))
+
+
 def raised(points, radius, height):
     """The points moved along z so that they are at `height`."""
     points = np.array(points, dtype=np.float64)

@@ -3,6 +3,7 @@
 #import math
 #import bindings
 #import volume
+#import chart
 
 // How many times the field was read by this invocation.
 var<private> evaluations: u32 = 0u;
@@ -25,7 +26,7 @@ struct Column {
     coverage: f32,
     height: f32, // 0 at the base of the cloud, 1 at its top
     precipitation: f32,
-    at: vec3f, // where the noises are read: without the wind's lean, the altitude as z, m; in a grid the point itself
+    at: vec3f, // where the noises are read: on the chart without the wind's lean, the altitude as z, m; in a grid the point itself
     medium: u32,
     thickness: f32, // of the cloud here from its base to its top, m
     depth_share: f32, // share of that below the point
@@ -104,17 +105,18 @@ fn cloud_column(p: vec3f, altitude: f32) -> Column {
         let thickness = frame.volume_high.z - frame.volume_low.z;
         return Column(select(0.0, 1.0, in_volume(p)), 1.0, 1.0, height, 0.0, p, CLOUD, thickness, height);
     }
-    let at = leant(p.xy, altitude);
+    let place = on_chart(p, altitude);
+    let at = leant(place, altitude);
     let broad = broad_weather(at);
     var weather = weather_from_map(weather_texel(frame.weather_origin, at, broad));
-    weather.coverage *= kept_clear(p.xy);
+    weather.coverage *= kept_clear(place);
     var column = cloud_in(weather, at, altitude);
     if RAIN_SHAFTS && altitude < params.clouds.base {
         column = rain_below(weather, at, altitude);
     }
     if UPPER {
         // Within the height of that deck where there is nothing, too: the march reads how much it lacks of being cloud.
-        let upper = upper_cloud_at(p, altitude, broad);
+        let upper = upper_cloud_at(place, altitude, broad);
         let alone = altitude > frame.lower_top && upper.height > 0.0 && upper.height < 1.0;
         if upper.limit > column.limit || (column.limit <= 0.0 && alone) {
             column = upper;
@@ -125,7 +127,7 @@ fn cloud_column(p: vec3f, altitude: f32) -> Column {
     return column;
 }
 
-// A place beside the eye, without the wind's lean.
+// A place on the chart, without the wind's lean.
 fn leant(place: vec2f, altitude: f32) -> vec2f {
     let lean = (altitude - params.clouds.base) / (params.clouds.top - params.clouds.base) * params.wind.shear;
     return place - lean * frame.wind_direction;
@@ -215,13 +217,13 @@ fn with_extent(given: Column, kind: f32, rain: f32, whole: f32) -> Column {
 }
 
 // The deck above, with a weather and a wind of its own.
-fn upper_cloud_at(p: vec3f, altitude: f32, broad: vec4f) -> Column {
+fn upper_cloud_at(place: vec2f, altitude: f32, broad: vec4f) -> Column {
     let base = params.upper_clouds.base;
     let height = (altitude - base) / (params.upper_clouds.top - base);
     let lean = height * params.upper_clouds.shear * frame.upper_direction;
-    let at = vec3f(p.xy - lean, altitude) / params.upper_clouds.scale;
+    let at = vec3f(place - lean, altitude) / params.upper_clouds.scale;
     let texel = weather_texel(frame.upper_weather_origin, at.xy, broad);
-    let coverage = kept_clear(p.xy) * saturate(texel.r + 2.0 * params.upper_clouds.coverage - 1.0);
+    let coverage = kept_clear(place) * saturate(texel.r + 2.0 * params.upper_clouds.coverage - 1.0);
     let kind = saturate(texel.g + 2.0 * params.upper_clouds.type_ - 1.0);
     let profile = height_profile(height, kind, 0.0);
     let inside = height > 0.0 && height < 1.0;

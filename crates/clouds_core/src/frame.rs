@@ -126,6 +126,12 @@ params! {
         /// The same for the top of the air.
         power_air: f32 = 0.0;
 
+        /// The distance of the eye from the planet's centre and the part of it along the axis through the origin, together, m
+        /// (chart.wgsl).
+        chart_reach: f32 = 12742000.0;
+        /// Where the eye is beside that axis, as a share of it: east and north.
+        chart_slope: [f32; 2] = [0.0, 0.0];
+
         /// Lowest altitude of procedural clouds and rain, m.
         shell_base: f32 = 0.0;
         /// Highest.
@@ -327,6 +333,21 @@ fn leap_scale(params: &Params) -> f32 {
     params.weather_shares().into_iter().map(of_weather).fold(params.clouds.shape_scale, f32::min)
 }
 
+/// As in chart.wgsl, where the chart ends near the antipode of the origin.
+const CHART_END: f64 = 0.01;
+
+/// What the scale of the chart at a point is the planet's diameter over, m (chart.wgsl).
+fn chart_reach(at: DVec3, radius: f64) -> f64 {
+    let from_centre = at + DVec3::Z * radius;
+    (from_centre.length() + from_centre.z).max(CHART_END * radius)
+}
+
+/// Where a point lies on the chart of weather and noises, m east and north of the origin (chart.wgsl).
+fn on_chart(at: DVec3, params: &Params) -> DVec2 {
+    let radius = f64::from(params.atmosphere.planet_radius);
+    2.0 * radius / chart_reach(at, radius) * at.truncate()
+}
+
 impl Frame {
     /// What the camera and the size of a picture say of it.
     pub fn seen_by(camera: &Camera, [width, height]: [u32; 2]) -> Self {
@@ -483,6 +504,9 @@ impl Frame {
         self.zenith = if distance > 0.0 { (from_centre / distance).as_vec3().to_array() } else { [0.0, 0.0, 1.0] };
         self.altitude = h as f32;
         self.centre_distance = distance as f32;
+        let reach = chart_reach(eye, radius);
+        self.chart_reach = reach as f32;
+        self.chart_slope = (eye.truncate() / reach).as_vec2().to_array();
         self.horizon_dip = (radius / (radius + h.max(0.0))).acos() as f32;
         // An eye under the ground is on it: were the ground to hide nothing from there, it would vanish at z = 0.
         self.power_ground = power(0.0).max(0.0);
@@ -524,10 +548,10 @@ impl Frame {
     }
 
     /// The noises and the weather of the upper deck, which are scaled with it.
-    fn set_upper_wind(&mut self, eye: DVec3, params: &Params, carried: &Carried) {
+    fn set_upper_wind(&mut self, eye: DVec2, params: &Params, carried: &Carried) {
         let (clouds, upper) = (&params.clouds, &params.upper_clouds);
         let scale = f64::from(upper.scale);
-        let (shape, detail) = (eye.truncate() - carried.upper, eye.truncate() - carried.upper_detail);
+        let (shape, detail) = (eye - carried.upper, eye - carried.upper_detail);
         let plane = |at: DVec2, tile: f32| [wrap(at.x / scale, tile), wrap(at.y / scale, tile)];
         let volume = |at: DVec2, tile: f32| {
             let [x, y] = plane(at, tile);
@@ -550,13 +574,14 @@ impl Frame {
         let volume = |at: DVec2, scale: f32| [wrap(at.x, scale), wrap(at.y, scale), wrap(-carried.rise, scale)];
         let plane = |at: DVec2, scale: f32| [wrap(at.x, scale), wrap(at.y, scale)];
         self.wind_direction = compass(f64::from(wind.direction)).as_vec2().to_array();
-        let (shape, detail) = (eye.truncate() - carried.shape, eye.truncate() - carried.detail);
+        let eye = on_chart(eye, params);
+        let (shape, detail) = (eye - carried.shape, eye - carried.detail);
         self.shape_origin = volume(shape, clouds.shape_scale);
         self.detail_origin = volume(detail, clouds.detail_scale);
         self.curl_origin = plane(detail, clouds.curl_scale);
 
         // The middle of the weather map is the origin of the world, its first row the north.
-        let weather = eye.truncate() - carried.weather;
+        let weather = eye - carried.weather;
         let half = 0.5 * f64::from(params.weather.extent);
         let (extent, edge) = (params.weather.extent, params.weather.edge);
         self.weather_origin = [on_map(weather.x + half, extent, edge), on_map(half - weather.y, extent, edge)];
@@ -574,12 +599,12 @@ impl Frame {
         self.set_upper_wind(eye, params, &carried);
 
         let (spot, radius) = params.clear_spot();
-        self.clear_at = (DVec2::from_array(spot) - eye.truncate()).as_vec2().to_array();
+        self.clear_at = (DVec2::from_array(spot) - eye).as_vec2().to_array();
         self.clear_radius = radius as f32;
 
         let along = compass(f64::from(high.direction));
         let across = DVec2::new(-along.y, along.x);
-        let at = eye.truncate() - carried.high;
+        let at = eye - carried.high;
         let at = DVec2::new(at.dot(along), at.dot(across));
         self.high_origin = plane(at, high.scale);
         self.high_broad_origin = plane(at, HIGH_BROAD * high.scale);

@@ -551,6 +551,7 @@ impl Renderer {
         array(py, texels, &[height as usize, width as usize, 3])
     }
 
+    #[expect(clippy::too_many_arguments, reason = "what an answer depends on")]
     fn probe<'py>(
         &self,
         py: Python<'py>,
@@ -558,11 +559,13 @@ impl Renderer {
         expression: &str,
         inputs: Vec<[f32; 4]>,
         params: &Bound<'_, PyAny>,
+        eye: [f64; 3],
         time: f64,
     ) -> PyResult<Bound<'py, PyAny>> {
         let params: Params = params_from_python(params)?;
-        let answers =
-            detached(py, |interrupt| lock(&self.core).probe(&imports, expression, &inputs, &params, time, interrupt))?;
+        let answers = detached(py, |interrupt| {
+            lock(&self.core).probe(&imports, expression, &inputs, &params, (eye.into(), time), interrupt)
+        })?;
         let count = answers.len();
         array(py, answers.into_flattened(), &[count, 4])
     }

@@ -202,16 +202,18 @@ fn steps_to_next(steps: Steps, direction: vec3f, column: Column, noise: f32, at:
         return quality.big_step;
     }
     let leaps = ray_leaps(direction, column.medium);
+    // By the chart, on which noise and cover change as fast everywhere.
     let lacks = 1.0 - column.coverage - noise * vec2f(1.0, column.profile);
     var way = leaps.reach * max(lacks.x, lacks.y / leaps.rise);
+    if KEEP_CLEAR {
+        way = min(way, way_to_rim(at));
+    }
+    way /= max(chart_scale(at.p, at.altitude), 1.0);
     if UPPER {
         way = way_to_decks(direction, way, at);
     }
     if RAIN_SHAFTS {
         way = min(way, way_to_rain(direction, at));
-    }
-    if KEEP_CLEAR {
-        way = min(way, way_to_rim(direction, at));
     }
     return u32(clamp(steps_over(steps, way, at.length), big, 1.0 + LONGEST_LEAP * (big - 1.0)));
 }
@@ -228,10 +230,9 @@ fn way_to_rain(direction: vec3f, at: Sample) -> f32 {
 
 // Where a spot is kept clear there is no more than without it, and leaps from outside hold; within it, to where the cover
 // begins, and in its rim none.
-fn way_to_rim(direction: vec3f, at: Sample) -> f32 {
-    let away = length(at.p.xy - frame.clear_at);
-    let within = max(frame.clear_radius - away, 0.0) / max(length(direction.xy), 1e-3);
-    return select(within, 1e30, away >= 1.5 * frame.clear_radius);
+fn way_to_rim(at: Sample) -> f32 {
+    let away = length(on_chart(at.p, at.altitude) - frame.clear_at);
+    return select(max(frame.clear_radius - away, 0.0), 1e30, away >= 1.5 * frame.clear_radius);
 }
 
 // A leap within a deck, no farther than to the other one; between both, all the way there.

@@ -509,13 +509,6 @@ def test_any_size(renderer, size):
     assert np.isfinite(layers["radiance"]).all() and np.isfinite(layers["sky"]).all()
 
 
-def test_the_view_ends_at_the_view_distance(renderer):
-    """Nothing is marched beyond it."""
-    camera, params = view_params("horizon")
-    short = renderer(16, 9, twin.fine(64, view_distance=1000.0)).render_layers(camera, params)
-    assert (short["transmittance"] == 1).all() and (short["samples"] == 0).all()
-
-
 HEIGHTS = [-5.0, 0.01, 1199.99, 1200.01, 3199.99, 3200.01, 20_000.0, 400_000.0, 4e7]
 
 

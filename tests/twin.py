@@ -236,6 +236,5 @@ def fine(view_steps, light_steps=1, **changes):
         "min_transmittance": 0.0,
         "contrast": 0.0,
         "jitter": False,
-        "view_distance": 1e9,
     }
     return nubis.Quality(**(values | changes))

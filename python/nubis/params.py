@@ -541,13 +541,10 @@ class Quality(Block):
         a number from 0 to 1.
     jitter : bool
         Whether each ray starts at a blue-noise offset of up to one step. Allowed: True or False.
-    view_distance : float
-        Farthest distance at which clouds are marched. Allowed: a number from 1000 to 1000000000 m.
     tolerance : float
         Largest relative change of a pixel when all steps are halved; they are until it is met. It
-        replaces everything above but `view_distance` by an integration that converges, and sun rays
-        go to the end of the clouds; 0 marches with the settings above. Allowed: a number from 0 to
-        1.
+        replaces everything above by an integration that converges, and sun rays go to the end of
+        the clouds; 0 marches with the settings above. Allowed: a number from 0 to 1.
     path_samples : int
         Paths traced for each pixel (light model `path`). Allowed: a whole number from 2 to 1048576.
     path_scatterings : int
@@ -571,7 +568,6 @@ class Quality(Block):
     min_transmittance: float = 0.01
     contrast: float = 0.3
     jitter: bool = True
-    view_distance: float = 400000.0
     tolerance: float = 0.0
     path_samples: int = 64
     path_scatterings: int = 4096

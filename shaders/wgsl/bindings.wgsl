@@ -20,6 +20,7 @@ override BROAD_WEATHER: bool = true; // a larger map shifts the weather
 override PROFILE_TABLE: bool = false; // the profile by height is the user's table
 override BEAMS: bool = false; // clouds cast shadows on the air
 override SCENE: bool = false; // there is a scene of the user's among the clouds
+override SUBRAYS: bool = false; // pixels may be wider than clouds, see subrays.wgsl
 override SPARSE: bool = false; // the clouds are known at the corners of cells of pixels alone, see lattice.wgsl
 override LIGHT_DETAIL: bool = true; // there are light samples that see the detail
 override LIGHT_CHEAP: bool = true; // there are light samples that do not

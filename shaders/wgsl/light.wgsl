@@ -43,7 +43,7 @@ fn optical_depth_to_sun(p: vec3f, opacity: f32, width: f32) -> f32 {
     if LIGHT_CHEAP && i < n + quality.far_sample {
         loop {
             let at = light_sample(samples, p, i, width);
-            depth += cloud_density_cheap(at.p, at.altitude, at.width) * at.length;
+            depth += cloud_density_cheap(at.p, at.altitude) * at.length;
             i += 1u;
             if i >= n + quality.far_sample {
                 break;

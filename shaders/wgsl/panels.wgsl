@@ -51,7 +51,7 @@ fn read_panel(panel: Panel, origin: vec3f, direction: vec3f, s: Stretches, width
     let a = cloud_column(p, altitude_at(p));
     let b = cloud_column(q, altitude_at(q));
     return Reading(
-        vec2f(cloud_density(a, cloud_shape(a, width), width), cloud_density(b, cloud_shape(b, width), width)),
+        vec2f(cloud_density(a, cloud_shape(a), width), cloud_density(b, cloud_shape(b), width)),
         vec2f(ambient_share(a), ambient_share(b)),
         vec2f(a.precipitation, b.precipitation),
     );

@@ -333,6 +333,9 @@ fn leap_scale(params: &Params) -> f32 {
     params.weather_shares().into_iter().map(of_weather).fold(params.clouds.shape_scale, f32::min)
 }
 
+/// Clouds are this much narrower than the distance from one to the next (as in subrays.wgsl).
+const CLOUD_WIDTH: f32 = 0.5;
+
 /// As in chart.wgsl, where the chart ends near the antipode of the origin.
 const CHART_END: f64 = 0.01;
 
@@ -383,6 +386,14 @@ impl Frame {
             _ => 2.0 * self.tan_half_fov / self.height as f32,
         };
         pixel * self.stride as f32
+    }
+
+    /// Whether pixels that look down on the clouds may be wider than those are (subrays.wgsl).
+    pub fn has_subrays(&self) -> bool {
+        // The farthest of them that the eye can see.
+        let away = self.power_top.max(0.0).sqrt();
+        let pixel = Self { stride: refine::spacing(self.sparse > 0), ..self.clone() }.marched_angle();
+        self.altitude > self.shell_top && away * pixel > CLOUD_WIDTH * self.leap_scale
     }
 
     /// How many pixels of the whole picture the clouds are known at, across and down (lattice.wgsl).

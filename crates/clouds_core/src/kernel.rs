@@ -87,6 +87,8 @@ pub(crate) struct Variant {
     pub beams: bool,
     /// Whether there is a scene of the user's.
     pub scene: bool,
+    /// Whether pixels may be wider than clouds.
+    pub subrays: bool,
     /// Whether the clouds are known at the corners of cells of pixels alone.
     pub sparse: bool,
     /// Whether there are light samples that see the detail.
@@ -131,6 +133,7 @@ impl Variant {
             profile_table: params.clouds.profile.is_some() && params.volume.is_none(),
             beams: false,
             scene: false,
+            subrays: false,
             sparse: false,
             light_detail: quality.cheap_light > 0.0,
             light_cheap: quality.cheap_light < 1.0
@@ -160,12 +163,13 @@ impl Variant {
             camera: frame.camera_kind,
             beams: frame.beams > 0,
             scene: frame.scene > 0,
+            subrays: params.volume.is_none() && frame.has_subrays(),
             sparse: frame.sparse > 0,
             ..Self::new(params, quality)
         }
     }
 
-    fn constants(self) -> [(&'static str, f64); 27] {
+    fn constants(self) -> [(&'static str, f64); 28] {
         let switch = |on| f64::from(u8::from(on));
         [
             ("MODEL", f64::from(self.model as u32)),
@@ -183,6 +187,7 @@ impl Variant {
             ("PROFILE_TABLE", switch(self.profile_table)),
             ("BEAMS", switch(self.beams)),
             ("SCENE", switch(self.scene)),
+            ("SUBRAYS", switch(self.subrays)),
             ("SPARSE", switch(self.sparse)),
             ("STRIDE", f64::from(reproject::stride(self.sparse))),
             ("LIGHT_DETAIL", switch(self.light_detail)),

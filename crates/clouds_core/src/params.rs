@@ -384,10 +384,8 @@ params! {
         contrast: f32 = 0.3, in 0..=1 "";
         /// Whether each ray starts at a blue-noise offset of up to one step.
         jitter: bool = true;
-        /// Farthest distance at which clouds are marched.
-        view_distance: f32 = 400000.0, in 1000..=1000000000 "m";
         /// Largest relative change of a pixel when all steps are halved; they are until it is met. It replaces everything
-        /// above but `view_distance` by an integration that converges, and sun rays go to the end of the clouds; 0
+        /// above by an integration that converges, and sun rays go to the end of the clouds; 0
         /// marches with the settings above.
         tolerance: f32 = 0.0, in 0..=1 "";
         /// Paths traced for each pixel (light model `path`).
@@ -761,7 +759,7 @@ impl Quality {
                 path_samples: 256,
                 ..balanced
             },
-            "reference" => Self { tolerance: 1e-3, path_samples: 1024, view_distance: 1e9, ..balanced },
+            "reference" => Self { tolerance: 1e-3, path_samples: 1024, ..balanced },
             // "A sample and five more in a cone"; the sixth is the far one.
             "nubis2015" => published,
             // Options A to D of the text: big steps of three, ten empty samples, light samples always full.

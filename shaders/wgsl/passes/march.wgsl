@@ -6,6 +6,7 @@
 #import density
 #import light
 #import scene_depth
+#import subrays
 
 @compute @workgroup_size(8, 8)
 fn march(
@@ -49,7 +50,7 @@ fn march_cell(index: u32, within: vec2f) -> vec2f {
     let view = view_direction(vec2f(pixel) + 0.5);
     var cloud = Cloud(vec3f(0.0), 1.0, -1.0, NOWHERE);
     if view.w > 0.0 {
-        cloud = march_ray(view.xyz, scene_distance(pixel), ray_offset(pixel), within);
+        cloud = march_pixel(pixel, view.xyz, within);
     }
     clouds[index] = vec4f(cloud.radiance, cloud.transmittance);
     cloud_depth[index] = cloud.depth;
@@ -62,6 +63,45 @@ struct Cloud {
     transmittance: f32,
     depth: f32, // m, -1 where there is none
     span: vec2f, // from the first to the last cloud, m from the start of the march; without end behind an opaque one
+}
+
+// Of several rays the mean, which share the steps and the light that one has.
+fn march_pixel(pixel: vec2u, view: vec3f, within: vec2f) -> Cloud {
+    let limit = scene_distance(pixel);
+    let offset = ray_offset(pixel);
+    let rays = rays_through(view);
+    if !SUBRAYS {
+        return march_ray(view, limit, offset, within, rays);
+    }
+    // Low-discrepancy sequences (R2, golden ratio) from where blue noise has it.
+    let shift = vec2f(offset, ray_offset(pixel + vec2u(29u, 13u)));
+    var sum = Cloud(vec3f(0.0), 0.0, 0.0, NOWHERE);
+    var opacity = 0.0;
+    var k = 0.0;
+    loop {
+        let place = ray_place(pixel, fract(shift + k * vec2f(0.7548776662, 0.5698402910)), rays);
+        let direction = view_direction(place).xyz;
+        let known = select(EVERYWHERE, within, rays <= 1.0);
+        let cloud = march_ray(direction, limit, fract(offset + 0.6180339887 * k), known, rays);
+        let weight = depth_weight(cloud.transmittance, cloud.depth);
+        // Under a condition that differs by pixel: else lavapipe adds to those that are done what the others' next turn finds
+        // (docs/numerics.md).
+        if k < rays {
+            sum.radiance += cloud.radiance / rays;
+            sum.transmittance += cloud.transmittance / rays;
+            sum.depth += weight * cloud.depth;
+            sum.span = vec2f(min(sum.span.x, cloud.span.x), max(sum.span.y, cloud.span.y));
+            opacity += weight;
+        }
+        k += 1.0;
+        if k >= rays {
+            break;
+        }
+    }
+    sum.depth = select(-1.0, sum.depth / opacity, opacity > 0.0);
+    // Neighbours of several rays say nothing of where those meet cloud.
+    sum.span = select(EVERYWHERE, sum.span, rays <= 1.0);
+    return sum;
 }
 
 // One blue-noise offset of up to a step for the whole ray: it turns bands into fine noise at no cost in error, where
@@ -84,7 +124,10 @@ struct Steps {
 // How many times the steps a ray through two decks gets, within the twice that the longest get.
 const TWO_DECKS = 1.5;
 
-fn ray_steps(start: f32, length: f32, direction: vec3f) -> Steps {
+// Of several rays through a pixel each gets its share of them, but no fewer than that.
+const SHARED_STEPS = 24.0;
+
+fn ray_steps(start: f32, length: f32, direction: vec3f, rays: f32) -> Steps {
     let slant = 1.0 - abs(dot(direction, frame.zenith));
     let count = mix(f32(quality.steps_zenith), f32(quality.steps_horizon), slant);
     // At full growth a step is a fixed share of its distance plus 300 m: rays that start in the cloud have fine steps
@@ -96,7 +139,8 @@ fn ray_steps(start: f32, length: f32, direction: vec3f) -> Steps {
     let reach = log(1.0 + growth * length);
     // So does one through two decks: with as many steps as through one, those of `two_decks` err by a half more.
     let decks = select(1.0, mix(1.0, TWO_DECKS, frame.upper_shown), UPPER && growth > 0.0);
-    let steps = round(count * clamp(decks * sqrt(reach), 1.0, 2.0));
+    let whole = round(count * clamp(decks * sqrt(reach), 1.0, 2.0));
+    let steps = max(round(whole / rays), min(whole, SHARED_STEPS));
     let each = reach / steps;
     // exp(each) - 1 with all its digits.
     let ratio = each * exp(each) * one_minus_exp_over(each);
@@ -252,10 +296,9 @@ fn way_to_decks(direction: vec3f, leap: f32, at: Sample) -> f32 {
 // Steps for each that a big step leaps over: where those leap over none, nothing does.
 const LONGEST_LEAP = 16.0;
 
-fn march_ray(direction: vec3f, limit: f32, offset: f32, within: vec2f) -> Cloud {
+fn march_ray(direction: vec3f, limit: f32, offset: f32, within: vec2f, rays: f32) -> Cloud {
     let stretches = stretches_before(cloud_stretches(direction), limit);
-    let room = max(quality.view_distance - stretches.start, 0.0);
-    let length = min(stretches.first + stretches.second, room);
+    let length = stretches.first + stretches.second;
     // The optical depth is summed, not the transmittance multiplied: a thousand factors of almost 1 are all 1, or all
     // 6e-8 less.
     var optical_depth = 0.0;
@@ -263,7 +306,7 @@ fn march_ray(direction: vec3f, limit: f32, offset: f32, within: vec2f) -> Cloud 
     if length <= 0.0 || (!VOLUME && !UPPER && params.clouds.coverage <= 0.0) {
         return Cloud(vec3f(0.0), 1.0, -1.0, NOWHERE);
     }
-    let steps = ray_steps(stretches.start, length, direction);
+    let steps = ray_steps(stretches.start, length, direction, rays);
     let pixel_size = pixel_width();
     let sunlit = is_sunlit();
     let nodes = ray_nodes(stretches.start, stretch_distance(stretches, length) - stretches.start);
@@ -283,7 +326,7 @@ fn march_ray(direction: vec3f, limit: f32, offset: f32, within: vec2f) -> Cloud 
     loop {
         let at = march_sample(stretches, steps, direction, offset, i, pixel_size);
         let column = cloud_column(at.p, at.altitude);
-        let noise = base_noise(column, at.width);
+        let noise = base_noise(column);
         if !(shape_in(column, noise) <= 0.0) {
             i = max(i - min(i, leapt - 1u), seen);
             break;
@@ -309,7 +352,7 @@ fn march_ray(direction: vec3f, limit: f32, offset: f32, within: vec2f) -> Cloud 
         loop {
             let at = march_sample(stretches, steps, direction, offset, i, pixel_size);
             let column = cloud_column(at.p, at.altitude);
-            let noise = base_noise(column, at.width);
+            let noise = base_noise(column);
             let shape = shape_in(column, noise);
             // Leaps outside clouds; on a hit back by what was leapt over.
             let searching = empty >= quality.empty_samples;
@@ -334,7 +377,7 @@ fn march_ray(direction: vec3f, limit: f32, offset: f32, within: vec2f) -> Cloud 
                 transmittance = transmittance_of(optical_depth);
                 i = select(i, end, transmittance < quality.min_transmittance);
             }
-            let share = quality.light_share * select(1.0, RAIN_SHARE, RAIN_SHAFTS && column.medium == RAIN);
+            let share = rays * quality.light_share * select(1.0, RAIN_SHARE, RAIN_SHAFTS && column.medium == RAIN);
             if group.weight > select(share, 0.0, i >= end) {
                 groups[count] = group;
                 count += 1u;

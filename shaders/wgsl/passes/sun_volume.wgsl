@@ -33,7 +33,7 @@ fn sun_volume_density(@builtin(global_invocation_id) id: vec3u) {
         // A low-discrepancy sequence (R3) that begins in the middle.
         let at = corner + fract(0.5 + f32(i) * vec3f(0.8191725, 0.6710436, 0.5497004));
         let altitude = mix(frame.shell_base, frame.shell_top, at.z / f32(frame.sun_volume_rows));
-        density += cloud_density_cheap(place(cell * at.xy, altitude), altitude, min(cell, 100.0));
+        density += cloud_density_cheap(place(cell * at.xy, altitude), altitude);
     }
     textureStore(volume_out, id, vec4f(density / f32(count)));
 }

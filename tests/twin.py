@@ -43,6 +43,16 @@ def on_chart(points, radius):
     return on_sphere[..., :2] * (2 * radius / (on_sphere[..., 2:] + radius))
 
 
+def from_chart(places, radius, height):
+    """The points over places on a map, at `height`."""
+    places = np.asarray(places, dtype=np.float64)
+    share = (places**2).sum(axis=-1, keepdims=True) / (2 * radius) ** 2
+    level = places / (1 + share) * (1 + height / radius)[..., None]
+    below = -2 * radius * share / (1 + share)
+    z = below[..., 0] * (1 + height / radius) + height
+    return np.concatenate([level, z[..., None]], axis=-1)
+
+
 def raised(points, radius, height):
     """The points moved along z so that they are at `height`."""
     points = np.array(points, dtype=np.float64)

@@ -33,6 +33,11 @@ class Base:
         return tuple((v.shape, v.tobytes()) if isinstance(v, np.ndarray) else v for v in values)
 
     def __setstate__(self, state: dict[str, Any]) -> None:
+        # Of another version there may be more.
+        names = [f.name for f in dataclasses.fields(self)]
+        for name, value in state.items():
+            if name not in names:
+                raise _unknown(f"{type(self).__name__}.{name}", value, names)
         # Copies and pickles of arrays come writeable.
         for value in state.values():
             if isinstance(value, np.ndarray):
@@ -242,7 +247,11 @@ def _grid(fields: Mapping[str, Any]) -> DensityGrid:
     return DensityGrid(_array("volume", "extinction", fields["extinction"]), fields["bounds"])
 
 
+# Fields that there are no more, and why.
+GONE = {"view_distance": "clouds are drawn to the horizon from any altitude"}
+
+
 def _unknown(path: str, value: Any, names: list[str]) -> ParameterError:
-    return ParameterError(
-        f"{path} = {value!r} is not allowed: there is no such field, only {', '.join(names)}"
-    )
+    gone = GONE.get(path.rpartition(".")[2])
+    why = f"{gone}, and there is no such field" if gone else "there is no such field"
+    return ParameterError(f"{path} = {value!r} is not allowed: {why}, only {', '.join(names)}")

@@ -65,8 +65,9 @@ class Clouds(Block):
     anvil : float
         How far the tops of cumulonimbus spread. Allowed: a number from 0 to 1.
     rain_extinction : float
-        Extinction of the rain that is seen below the clouds where it is heaviest; 0 hides it.
-        Allowed: a number from 0 to 1 1/m.
+        Extinction of the rain that is seen below the clouds where it is heaviest; 0 hides it. What
+        is thinner than clean air (1e-5) evaporates before it reaches the ground. Allowed: a number
+        from 0 to 1 1/m.
     extinction : float
         Extinction where the density is 1. Allowed: a number from 0 to 100000000 1/m.
     seed : int
@@ -174,8 +175,9 @@ class Weather(Block):
     Attributes
     ----------
     extent : float
-        Width of the square that one map covers, about the origin of the world. Allowed: a number
-        from 100 to 10000000 m.
+        Width of the square that one map covers, about the origin of the world. It lies on the
+        planet in stereographic projection: true at the origin, in proportion anywhere. Allowed: a
+        number from 100 to 10000000 m.
     edge : {repeat, mirror, clamp}
         What lies beyond that square: the map again, its mirror image, or what is at its edge.
         Allowed: one of "repeat", "mirror", "clamp".
@@ -197,8 +199,8 @@ class Weather(Block):
         Allowed: a number from 0 to 2.
     broad_variety : float
         How much a second, larger map shifts the weather, by seed or `broad_map`, so that no part of
-        the sky looks like another; 0 leaves the first map as it is. The baked one leaves a `map` of
-        yours alone. Allowed: a number from 0 to 1.
+        the sky looks like another; 0 leaves the first map as it is. From 0.3 on the baked one also
+        bends it in full. It leaves a `map` of yours alone. Allowed: a number from 0 to 1.
     broad_extent : float
         Width of the square that the larger map covers; beyond it, that repeats. Allowed: a number
         from 100 to 10000000 m.

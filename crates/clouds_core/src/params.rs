@@ -115,7 +115,8 @@ params! {
         cumulonimbus_top: f32 = 8000.0, in 1..=25000 "m";
         /// How far the tops of cumulonimbus spread.
         anvil: f32 = 0.5, in 0..=1 "";
-        /// Extinction of the rain that is seen below the clouds where it is heaviest; 0 hides it.
+        /// Extinction of the rain that is seen below the clouds where it is heaviest; 0 hides it. What is thinner than clean air
+        /// (1e-5) evaporates before it reaches the ground.
         rain_extinction: f32 = 0.0, in 0..=1 "1/m";
         /// Extinction where the density is 1.
         extinction: f32 = 0.2, in 0..=100000000 "1/m";
@@ -174,7 +175,8 @@ params! {
 
     /// The weather map: where the clouds stand.
     Weather {
-        /// Width of the square that one map covers, about the origin of the world.
+        /// Width of the square that one map covers, about the origin of the world. It lies on the planet in stereographic
+        /// projection: true at the origin, in proportion anywhere.
         extent: f32 = 60000.0, in 100..=10000000 "m";
         /// What lies beyond that square: the map again, its mirror image, or what is at its edge.
         edge: Edge = Edge::Repeat;
@@ -191,7 +193,8 @@ params! {
         /// How much the type of cloud varies from place to place; 0 makes it the same everywhere.
         type_variety: f32 = 0.9, in 0..=2 "";
         /// How much a second, larger map shifts the weather, by seed or `broad_map`, so that no part of the sky looks like
-        /// another; 0 leaves the first map as it is. The baked one leaves a `map` of yours alone.
+        /// another; 0 leaves the first map as it is. From 0.3 on the baked one also bends it in full. It leaves a `map` of
+        /// yours alone.
         broad_variety: f32 = 0.3, in 0..=1 "";
         /// Width of the square that the larger map covers; beyond it, that repeats.
         broad_extent: f32 = 430000.0, in 100..=10000000 "m";

@@ -124,8 +124,9 @@ struct Steps {
 // How many times the steps a ray through two decks gets, within the twice that the longest get.
 const TWO_DECKS = 1.5;
 
-// Of several rays through a pixel each gets its share of them, but no fewer than that.
-const SHARED_STEPS = 24.0;
+// Of several rays through a pixel each gets its share of them, but no less than that of what one alone gets: toward the limb from
+// 402 km, in a picture of 32x32, `draft` finds a cover of 0.563 with a tenth, 0.591 with a third and 0.596 with all.
+const SHARED_STEPS = 0.5;
 
 fn ray_steps(start: f32, length: f32, direction: vec3f, rays: f32) -> Steps {
     let slant = 1.0 - abs(dot(direction, frame.zenith));
@@ -140,7 +141,7 @@ fn ray_steps(start: f32, length: f32, direction: vec3f, rays: f32) -> Steps {
     // So does one through two decks: with as many steps as through one, those of `two_decks` err by a half more.
     let decks = select(1.0, mix(1.0, TWO_DECKS, frame.upper_shown), UPPER && growth > 0.0);
     let whole = round(count * clamp(decks * sqrt(reach), 1.0, 2.0));
-    let steps = max(round(whole / rays), min(whole, SHARED_STEPS));
+    let steps = max(round(whole * max(1.0 / rays, SHARED_STEPS)), 1.0);
     let each = reach / steps;
     // exp(each) - 1 with all its digits.
     let ratio = each * exp(each) * one_minus_exp_over(each);

@@ -336,8 +336,8 @@ def high_thickness(values, high):
 
 
 def high_clouds(points, params, time):
-    """Thickness of the high clouds at places on the chart (N, 2), of the thickest, and how much thicker
-    they are than 0.02 tiles nearer to the sun.
+    """Thickness of the high clouds at places on the chart (N, 2), of the thickest, and how much
+    thicker they are than 0.02 tiles nearer to the sun.
     """
     high = params.high_clouds
     wind = twin.compass(float(f32(high.direction)))[:2]

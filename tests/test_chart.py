@@ -34,7 +34,7 @@ def visible(eye, rng, n):
     """World points of the clouds that an eye sees, and of those beyond its horizon that rise over
     it.
     """
-    height = np.linalg.norm(np.array(eye) + (0, 0, RADIUS)) - RADIUS
+    height = twin.altitude(eye, RADIUS)
     most = math.acos(RADIUS / (RADIUS + max(height, 0))) + math.acos(RADIUS / (RADIUS + 10_000))
     cap = at_angle(most * np.sqrt(rng.uniform(0, 1, n)), rng.uniform(0, 2 * np.pi, n), 0)
     return twin.raised(cap, RADIUS, rng.uniform(0, 10_000, n)), most

@@ -138,7 +138,8 @@ def test_density_is_the_published_sampler(renderer, rng, time):
     points, altitude = points_in_shell(rng, params, 4000, 30_000)
     height = (altitude - c.base) / (c.top - c.base)
     downwind = twin.compass(w.direction)[:2]
-    at = twin.on_chart(points, params.atmosphere.planet_radius) - (height * w.shear)[:, None] * downwind
+    places = twin.on_chart(points, params.atmosphere.planet_radius)
+    at = places - (height * w.shear)[:, None] * downwind
 
     def moved(xy, speed):
         return np.column_stack([xy - time * speed * downwind, altitude - time * w.updraft])

@@ -117,12 +117,19 @@ def test_converged_and_traced_clouds_are_as_many(renderer):
 @pytest.mark.parametrize(("height", "fov"), [(3e6, 40.0), (3.6e7, 8.0)])
 def test_clouds_smaller_than_pixels_do_not_speckle(renderer, height, fov):
     """A pixel that covers many clouds has their mean: neighbours differ by 0.2 at most, root mean
-    square, where one ray through each would see cloud or none and differ by 0.6. None is brighter
-    than its clouds, where the number of rays changes from pixel to pixel.
+    square, where one ray through each would see cloud or none and differ by 0.6.
     """
     layers = renderer(64, 64).render_layers(straight_down(height, fov), CUMULUS)
     opacity = 1 - layers["transmittance"].astype(float)
     assert np.sqrt(np.mean(np.diff(opacity, axis=1) ** 2)) < 0.2
+
+
+def test_no_line_where_the_number_of_rays_changes(renderer):
+    """No pixel is brighter, or clearer than clear, than the clouds around it, where its neighbours
+    have more rays: on lavapipe the others' last turn was added to it.
+    """
+    layers = renderer(240, 120).render_layers(toward_limb(4.02e5, 8.0, 30.0), CUMULUS)
+    opacity = 1 - layers["transmittance"].astype(float)
     assert opacity.min() >= 0
-    light = layers["radiance"].sum(axis=-1) / np.maximum(opacity, 0.05)
-    assert light.max() < 1.5 * np.percentile(light, 95)
+    light = layers["radiance"].sum(axis=-1) / np.maximum(opacity, 0.2)
+    assert light.max() < 1.5 * np.percentile(light, 99)

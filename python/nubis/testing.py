@@ -43,4 +43,5 @@ def probe(
     full = np.zeros((len(given), 4), dtype=np.float32)
     full[:, : given.shape[1]] = given
     renderer = Renderer(1, 1, quality=quality)
-    return renderer._core.probe(list(imports), expression, full.tolist(), params or Params(), eye, time)
+    given_params = params or Params()
+    return renderer._core.probe(list(imports), expression, full.tolist(), given_params, eye, time)

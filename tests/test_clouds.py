@@ -279,7 +279,8 @@ def test_the_upper_deck_has_its_own_wind(renderer, rng, time):
     lower = rng.uniform((-5000, -5000, 1300), (5000, 5000, 3100), (3000, 3))
     radius = params.atmosphere.planet_radius
     heights = twin.altitude(upper, radius)
-    drifted = twin.raised(upper + time * 12.0 * np.array([1.0, 0, 0]), radius, heights)
+    places = twin.on_chart(upper, radius) + time * 12.0 * np.array([1.0, 0])
+    drifted = twin.from_chart(places, radius, heights)
     before, after = (
         renderer().density(upper, params),
         renderer().density(drifted, params, time=time),

@@ -138,7 +138,8 @@ def test_density_is_the_published_sampler(renderer, rng, time):
     points, altitude = points_in_shell(rng, params, 4000, 30_000)
     height = (altitude - c.base) / (c.top - c.base)
     downwind = twin.compass(w.direction)[:2]
-    at = points[:, :2] - (height * w.shear)[:, None] * downwind
+    places = twin.on_chart(points, params.atmosphere.planet_radius)
+    at = places - (height * w.shear)[:, None] * downwind
 
     def moved(xy, speed):
         return np.column_stack([xy - time * speed * downwind, altitude - time * w.updraft])
@@ -264,7 +265,8 @@ def test_wind_carries_the_field(renderer, rng, time, speed):
     params = wind_params(direction, speed)
     radius = params.atmosphere.planet_radius
     points, heights = points_in_shell(rng, params, 2000, 10_000)
-    carried = twin.raised(points + time * speed * twin.compass(direction), radius, heights)
+    places = twin.on_chart(points, radius) + time * speed * twin.compass(direction)[:2]
+    carried = twin.from_chart(places, radius, heights)
     before = renderer().density(points, params)
     after = renderer().density(carried, params, time=time)
     assert (before > 0).mean() > 0.05

@@ -199,7 +199,9 @@ def test_the_whole_layer_follows_its_formulas(renderer, rng, curve, kind):
     params = high_params(values | {"coverage": 0.6, "direction": 33.0, "stretch": 2.0})
     points = rng.uniform(-30_000, 30_000, (300, 2))
     got = thickness(renderer, points, params, time=1234.0)
-    expected = noise_twin.high_clouds(points, params, 1234.0)[0]
+    radius, height = params.atmosphere.planet_radius, params.high_clouds.altitude
+    layer = twin.raised(np.column_stack([points, np.zeros(300)]), radius, height)
+    expected = noise_twin.high_clouds(twin.on_chart(layer, radius), params, 1234.0)[0]
     assert expected.std() > 0.1
     # A texel is wrong by up to 2^-11, which the steeper curve multiplies by 2.5.
     np.testing.assert_allclose(got, expected, atol=2e-3)
@@ -405,7 +407,8 @@ def test_emboss(renderer, down, kind):
     )
     np.testing.assert_array_equal(plain["transmittance"], embossed["transmittance"])
     at, *_ = layer_hits(camera, SIZE, params)
-    thick, relief = noise_twin.high_clouds(at[..., :2].reshape(-1, 2), params, 0.0)
+    places = twin.on_chart(at.reshape(-1, 3), params.atmosphere.planet_radius)
+    thick, relief = noise_twin.high_clouds(places, params, 0.0)
     expected = 1 + 0.6 * 0.9 * relief / (np.abs(relief) + 0.15)
     seen = thick > 0.02
     ratio = (embossed["radiance"] / np.maximum(plain["radiance"], 1e-9))[..., 0].ravel()

@@ -17,11 +17,10 @@ CLEAR = CLOUDY.with_(**{"weather.clear_at": SPOT, "weather.clear_radius": RADIUS
 
 def points_around(rng, n, spot=SPOT, reach=2.5 * RADIUS, params=CLEAR):
     """Points at all heights of the clouds, and how far each is from the middle of the spot."""
-    points = np.zeros((n, 3))
-    points[:, :2] = np.array(spot) + rng.uniform(-reach, reach, (n, 2))
+    places = np.array(spot) + rng.uniform(-reach, reach, (n, 2))
     altitude = rng.uniform(params.clouds.base, params.clouds.top, n)
-    points = twin.raised(points, params.atmosphere.planet_radius, altitude)
-    return points, np.linalg.norm(points[:, :2] - spot, axis=1)
+    points = twin.from_chart(places, params.atmosphere.planet_radius, altitude)
+    return points, np.linalg.norm(places - spot, axis=1)
 
 
 @pytest.mark.parametrize("time", [0.0, 3000.0])
@@ -67,7 +66,8 @@ def test_far_from_the_origin(renderer, rng):
     )
     params = everywhere.with_(**{"weather.clear_at": spot, "weather.clear_radius": 8.0})
     points, away = points_around(rng, 4000, spot, 16.0, params)
-    cover = noise_twin.kept_clear(points, params.weather)
+    places = twin.on_chart(points, params.atmosphere.planet_radius)
+    cover = noise_twin.kept_clear(places, params.weather)
     got = renderer().density(points, params) / params.clouds.extinction
     full = renderer().density(points, everywhere) / params.clouds.extinction
     # With full cover the shape is what `with_coverage` makes of it with less.

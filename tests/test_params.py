@@ -409,6 +409,16 @@ def test_unknown_names_and_wrong_groups(change, named):
     assert named in str(error.value)
 
 
+def test_fields_of_older_versions():
+    """What is gone is named with the reason, in calls and in pickles."""
+    with pytest.raises(ParameterError, match=r"Quality\.view_distance = 4.* horizon"):
+        Quality().replace(view_distance=4e5)
+    old = copy.copy(Quality())
+    object.__setattr__(old, "view_distance", 4e5)
+    with pytest.raises(ParameterError, match=r"Quality\.view_distance = 4.* horizon"):
+        pickle.loads(pickle.dumps(old))
+
+
 @pytest.mark.parametrize("top", [1000.0, 999.0])
 def test_tops_are_above_bases(top):
     with pytest.raises(

@@ -34,6 +34,25 @@ def altitude(points, radius):
     return np.linalg.norm(from_centre(points, radius), axis=-1) - radius
 
 
+def on_chart(points, radius):
+    """Where points lie on a map: seen from the antipode of the origin, on the plane that touches
+    the planet there.
+    """
+    up = from_centre(points, radius)
+    on_sphere = up / np.linalg.norm(up, axis=-1, keepdims=True) * radius
+    return on_sphere[..., :2] * (2 * radius / (on_sphere[..., 2:] + radius))
+
+
+def from_chart(places, radius, height):
+    """The points over places on a map, at `height`."""
+    places = np.asarray(places, dtype=np.float64)
+    share = (places**2).sum(axis=-1, keepdims=True) / (2 * radius) ** 2
+    level = places / (1 + share) * (1 + height / radius)[..., None]
+    below = -2 * radius * share / (1 + share)
+    z = below[..., 0] * (1 + height / radius) + height
+    return np.concatenate([level, z[..., None]], axis=-1)
+
+
 def raised(points, radius, height):
     """The points moved along z so that they are at `height`."""
     points = np.array(points, dtype=np.float64)
@@ -69,7 +88,7 @@ def pixel_directions(camera, width, height):
 def shell(params):
     """The lowest and the highest altitude at which there can be anything."""
     clouds, deck = params.clouds, params.upper_clouds
-    top = max(clouds.top, clouds.cumulonimbus_top if clouds.precipitation > 0.2 else 0.0)
+    top = max(clouds.top, clouds.cumulonimbus_top if clouds.precipitation > 0 else 0.0)
     lowest = 0.0 if clouds.rain_extinction > 0 else clouds.base
     return lowest, max(top, deck.top if deck.coverage > 0 else 0.0)
 
@@ -227,6 +246,5 @@ def fine(view_steps, light_steps=1, **changes):
         "min_transmittance": 0.0,
         "contrast": 0.0,
         "jitter": False,
-        "view_distance": 1e9,
     }
     return nubis.Quality(**(values | changes))

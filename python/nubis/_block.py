@@ -42,6 +42,11 @@ class Base:
         return tuple((v.shape, v.tobytes()) if isinstance(v, np.ndarray) else v for v in values)
 
     def __setstate__(self, state: dict[str, Any]) -> None:
+        # Of another version there may be more.
+        names = [f.name for f in dataclasses.fields(self)]
+        for name, value in state.items():
+            if name not in names:
+                raise _unknown(f"{type(self).__name__}.{name}", value, names)
         # Copies and pickles of arrays come writeable.
         for value in state.values():
             if isinstance(value, np.ndarray):
@@ -349,6 +354,12 @@ def _grid(fields: Mapping[str, Any]) -> DensityGrid:
     return DensityGrid(fields["extinction"], fields["bounds"])
 
 
+# Fields that there are no more, and why.
+GONE = {"view_distance": "clouds are drawn to the horizon from any altitude"}
+
+
 def _unknown(path: str, value: Any, names: list[str]) -> ParameterError:
-    words = unknown(f"{path} = {value!r}", path, names, "a field that there is, one of")
+    gone = GONE.get(path.rpartition(".")[2])
+    allowed = f"{gone}; a field that there is" if gone else "a field that there is"
+    words = unknown(f"{path} = {value!r}", path, names, f"{allowed}, one of")
     return ParameterError(words)

@@ -236,6 +236,7 @@ class Renderer:
         expression: str,
         inputs: list[list[float]],
         params: Params,
+        eye: tuple[float, float, float],
         time: float,
     ) -> npt.NDArray[np.float32]: ...
     def timings(self) -> list[tuple[str, float]]: ...

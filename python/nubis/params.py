@@ -65,8 +65,9 @@ class Clouds(Block):
     anvil : float
         How far the tops of cumulonimbus spread. Allowed: a number from 0 to 1.
     rain_extinction : float
-        Extinction of the rain that is seen below the clouds where it is heaviest; 0 hides it.
-        Allowed: a number from 0 to 1 1/m.
+        Extinction of the rain that is seen below the clouds where it is heaviest; 0 hides it. What
+        is thinner than clean air (1e-5) evaporates before it reaches the ground. Allowed: a number
+        from 0 to 1 1/m.
     extinction : float
         Extinction where the density is 1. Allowed: a number from 0 to 100000000 1/m.
     seed : int
@@ -174,8 +175,9 @@ class Weather(Block):
     Attributes
     ----------
     extent : float
-        Width of the square that one map covers, about the origin of the world. Allowed: a number
-        from 100 to 10000000 m.
+        Width of the square that one map covers, about the origin of the world. It lies on the
+        planet in stereographic projection: true at the origin, in proportion anywhere. Allowed: a
+        number from 100 to 10000000 m.
     edge : {repeat, mirror, clamp}
         What lies beyond that square: the map again, its mirror image, or what is at its edge.
         Allowed: one of "repeat", "mirror", "clamp".
@@ -197,8 +199,8 @@ class Weather(Block):
         Allowed: a number from 0 to 2.
     broad_variety : float
         How much a second, larger map shifts the weather, by seed or `broad_map`, so that no part of
-        the sky looks like another; 0 leaves the first map as it is. The baked one leaves a `map` of
-        yours alone. Allowed: a number from 0 to 1.
+        the sky looks like another; 0 leaves the first map as it is. From 0.3 on the baked one also
+        bends it in full. It leaves a `map` of yours alone. Allowed: a number from 0 to 1.
     broad_extent : float
         Width of the square that the larger map covers; beyond it, that repeats. Allowed: a number
         from 100 to 10000000 m.
@@ -547,15 +549,15 @@ class Quality(Block):
         How far a ray may leap through clear air, beyond `big_step`: as a share of
         `clouds.shape_scale` (of `weather.scale` or two and a half pixels of `weather.map`, if that
         is less) for each unit that the base shape lacks of being cloud. On a hit the march goes
-        back. 0 leaps no farther than `big_step`; none does where that is 1, in grids and with rain
-        in sight. Allowed: a number from 0 to 1.
+        back. 0 leaps no farther than `big_step`; none does where that is 1, in grids and in rain.
+        Allowed: a number from 0 to 1.
     empty_samples : int
         Full samples of zero in a row after which samples are cheap again (nubis2015: 6). Allowed: a
         whole number from 1 to 4096.
     light_steps : int
         Light samples toward the sun, besides the far one. Where they spread to the end of the
-        clouds, a third of them is for a second deck above the point. Allowed: a whole number from 1
-        to 128.
+        clouds, there is a third more for a second deck above the point. Allowed: a whole number
+        from 1 to 128.
     light_share : float
         Share of a pixel's cloud that is lit as one, by the light samples of one place in it:
         samples in a row are lit together once they have gathered more. 0 lights each sample by
@@ -590,13 +592,10 @@ class Quality(Block):
         a number from 0 to 1.
     jitter : bool
         Whether each ray starts at a blue-noise offset of up to one step. Allowed: True or False.
-    view_distance : float
-        Farthest distance at which clouds are marched. Allowed: a number from 1000 to 1000000000 m.
     tolerance : float
         Largest relative change of a pixel when all steps are halved; they are until it is met. It
-        replaces everything above but `view_distance` by an integration that converges, and sun rays
-        go to the end of the clouds; 0 marches with the settings above. Allowed: a number from 0 to
-        1.
+        replaces everything above by an integration that converges, and sun rays go to the end of
+        the clouds; 0 marches with the settings above. Allowed: a number from 0 to 1.
     path_samples : int
         Paths traced for each pixel (light model `path`). Allowed: a whole number from 2 to 1048576.
     path_scatterings : int
@@ -620,7 +619,6 @@ class Quality(Block):
     min_transmittance: float = 0.01
     contrast: float = 0.3
     jitter: bool = True
-    view_distance: float = 400000.0
     tolerance: float = 0.0
     path_samples: int = 64
     path_scatterings: int = 4096

@@ -18,6 +18,7 @@ def probe(
     *,
     imports: Sequence[str] = (),
     params: Params | None = None,
+    eye: tuple[float, float, float] = (0.0, 0.0, 0.0),
     time: float = 0.0,
     quality: str | Quality = "balanced",
 ) -> npt.NDArray[np.float32]:
@@ -31,6 +32,8 @@ def probe(
         Missing components of ``x`` are 0.
     imports : sequence of str
         Files of ``shaders/wgsl`` without the ending, such as ``"phase"``.
+    eye : three floats
+        Where the eye is that the shaders count positions from, in metres.
 
     Returns
     -------
@@ -48,4 +51,5 @@ def probe(
     full = np.zeros((len(given), 4), dtype=np.float32)
     full[:, : given.shape[1]] = given
     renderer = Renderer(1, 1, quality=quality)
-    return renderer._core.probe(list(imports), expression, full.tolist(), params or Params(), time)
+    given_params = params or Params()
+    return renderer._core.probe(list(imports), expression, full.tolist(), given_params, eye, time)

@@ -1,6 +1,7 @@
 // The high clouds as a layer without thickness on a sphere (nubis2015, thesis2018; cover as in gems2001).
 #import math
 #import bindings
+#import chart
 
 // How much larger the second read is than the first: no small ratio, so that they do not repeat together (as in frame.rs).
 const BROAD = 3.2;
@@ -29,7 +30,8 @@ fn high_optical_depth(p: vec3f) -> f32 {
 fn high_cloud_at(p: vec3f, emboss: bool) -> HighCloud {
     let along = frame.high_direction;
     let across = vec2f(-along.y, along.x);
-    let tiles = vec2f(dot(p.xy, along), dot(p.xy, across)) / params.high_clouds.scale;
+    let place = on_chart(p, params.high_clouds.altitude);
+    let tiles = vec2f(dot(place, along), dot(place, across)) / params.high_clouds.scale;
     // A second read at another scale breaks the tiles up.
     let broad = textureSampleLevel(high_map, repeat_sampler, frame.high_broad_origin + tiles / BROAD, 0.0).r;
     let uv = frame.high_origin + tiles;

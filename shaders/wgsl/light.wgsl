@@ -21,8 +21,8 @@ const CONE = array<vec3f, 6>(
 // Optical depth from a point toward the sun. Each sample stands for the stretch around it, which grows with its distance;
 // the far one, at three times the reach of the others (nubis2015), for the stretch from one to five times.
 fn optical_depth_to_sun(p: vec3f, opacity: f32, width: f32) -> f32 {
-    let n = quality.light_steps;
     let samples = light_samples(p);
+    let n = samples.count;
     var depth = 0.0;
     // Behind little cloud the near samples see the detail; the others are cheap.
     // So are those that stand for most of a tile of the detail, over which it is its mean.
@@ -43,7 +43,7 @@ fn optical_depth_to_sun(p: vec3f, opacity: f32, width: f32) -> f32 {
     if LIGHT_CHEAP && i < n + quality.far_sample {
         loop {
             let at = light_sample(samples, p, i, width);
-            depth += cloud_density_cheap(at.p, at.altitude, at.width) * at.length;
+            depth += cloud_density_cheap(at.p, at.altitude) * at.length;
             i += 1u;
             if i >= n + quality.far_sample {
                 break;
@@ -67,6 +67,7 @@ struct LightSamples {
     rate: f32, // of the logarithm for each sample; 0 for squares
     near: u32, // how many of them lie so; the others, evenly in the deck above
     above: vec2f, // where that begins and ends, m
+    count: u32, // of both, without the far one
 }
 
 // m: light is lost in the first tens of metres or not for kilometres.
@@ -75,45 +76,48 @@ const NEAR = 150.0;
 fn light_samples(p: vec3f) -> LightSamples {
     let n = quality.light_steps;
     if SUN_VOLUME {
-        return LightSamples(NEAR_CELLS * level_cell(level_at(p.xy)), 0.0, n, vec2f(0.0));
+        return LightSamples(NEAR_CELLS * level_cell(level_at(p.xy)), 0.0, n, vec2f(0.0), n);
     }
     if quality.light_distance > 0.0 {
-        return LightSamples(quality.light_distance, 0.0, n, vec2f(0.0));
+        return LightSamples(quality.light_distance, 0.0, n, vec2f(0.0), n);
     }
     let s = cloud_stretches_from(p, frame.sun_direction);
     var reach = s.start + s.first + s.gap + s.second;
-    var near = n;
+    var count = n;
     var above = vec2f(0.0);
-    if UPPER && n >= 3u && altitude_at(p) < lower_top() && lower_top() <= params.upper_clouds.base {
-        // A third of the samples: of those as long as they are far, one or none would meet that deck. With them, `draft` errs by
-        // 26 % in `two_decks`, not 14.
-        near = n - n / 3u;
-        above = vec2f(hit_sphere_from(p, frame.sun_direction, params.upper_clouds.base).far, reach);
-        reach = hit_sphere_from(p, frame.sun_direction, lower_top()).far;
+    if UPPER && altitude_at(p) < frame.lower_top {
+        // A third more samples: of those as long as they are far, one or none would meet that deck. With them, `draft` errs by
+        // 26 % in `two_decks`, not 14. Were they of the others, those would lie elsewhere as soon as there is such a deck.
+        count = n + (n + 2u) / 3u;
+        let begin = hit_sphere_from(p, frame.sun_direction, max(params.upper_clouds.base, frame.lower_top)).far;
+        above = vec2f(min(begin, reach), reach);
+        reach = min(hit_sphere_from(p, frame.sun_direction, frame.lower_top).far, reach);
     }
-    return LightSamples(reach, log2(1.0 + reach / NEAR) / f32(near), near, above);
+    return LightSamples(reach, log2(1.0 + reach / NEAR) / f32(n), n, above, count);
 }
 
 // How many samples, from the first on, stand for less than most of a tile of the detail.
 fn detailed_samples(samples: LightSamples) -> u32 {
     let most = 0.875 * params.clouds.detail_scale;
-    let above = (samples.above.y - samples.above.x) / f32(max(quality.light_steps - samples.near, 1u));
-    if samples.rate <= 0.0 || (UPPER && samples.near < quality.light_steps && above < most) {
-        return quality.light_steps;
+    if samples.rate <= 0.0 {
+        return samples.near;
     }
     let first = NEAR * (exp2(samples.rate) - 1.0);
-    return u32(clamp(ceil(log2(max(most / first, 1.0)) / samples.rate), 0.0, f32(samples.near)));
+    let near = u32(clamp(ceil(log2(max(most / first, 1.0)) / samples.rate), 0.0, f32(samples.near)));
+    // Those above come last: they see the detail where all others do.
+    let above = (samples.above.y - samples.above.x) / f32(max(samples.count - samples.near, 1u));
+    return select(near, samples.count, UPPER && near == samples.near && above < most);
 }
 
 // Where the stretch of a sample begins, m.
 fn light_stretch(samples: LightSamples, i: f32) -> f32 {
     if UPPER && i > f32(samples.near) {
-        return mix(samples.above.x, samples.above.y, (i - f32(samples.near)) / f32(quality.light_steps - samples.near));
+        return mix(samples.above.x, samples.above.y, (i - f32(samples.near)) / f32(samples.count - samples.near));
     }
     if samples.rate > 0.0 {
         return NEAR * (exp2(samples.rate * i) - 1.0);
     }
-    let share = i / f32(quality.light_steps);
+    let share = i / f32(samples.near);
     return share * share * samples.reach;
 }
 
@@ -128,7 +132,7 @@ fn light_sample(samples: LightSamples, p: vec3f, i: u32, width: f32) -> LightSam
     let a = select(light_stretch(samples, f32(i)), samples.above.x, UPPER && i == samples.near);
     let b = light_stretch(samples, f32(i + 1u));
     let reach = samples.reach;
-    let is_far = i == quality.light_steps;
+    let is_far = i == samples.count;
     let length = select(b - a, 4.0 * reach, is_far);
     let s = select(0.5 * (a + b), 3.0 * reach, is_far);
     let at = p + s * (frame.sun_direction + quality.cone * CONE[i % 6u]);

@@ -51,7 +51,7 @@ fn read_panel(panel: Panel, origin: vec3f, direction: vec3f, s: Stretches, width
     let a = cloud_column(p, altitude_at(p));
     let b = cloud_column(q, altitude_at(q));
     return Reading(
-        vec2f(cloud_density(a, cloud_shape(a, width), width), cloud_density(b, cloud_shape(b, width), width)),
+        vec2f(cloud_density(a, cloud_shape(a), width), cloud_density(b, cloud_shape(b), width)),
         vec2f(ambient_share(a), ambient_share(b)),
         vec2f(a.precipitation, b.precipitation),
     );
@@ -82,7 +82,7 @@ fn finest_feature() -> f32 {
     if VOLUME {
         return 1e30;
     }
-    let detail = params.clouds.detail_scale / select(32.0, 32.0 * FINER / 2.5, FINE_DETAIL);
+    let detail = params.clouds.detail_scale / (32.0 * FINER / 2.5);
     let noise = min(params.clouds.shape_scale / 128.0, detail);
     return min(select(1.0, min(params.upper_clouds.scale, 1.0), UPPER) * noise, thinnest_deck() / 128.0);
 }

@@ -124,10 +124,22 @@ params! {
         /// The same for the top of the air.
         power_air: f32 = 0.0;
 
+        /// The distance of the eye from the planet's centre and the part of it along the axis through the origin, together, m
+        /// (chart.wgsl).
+        chart_reach: f32 = 12742000.0;
+        /// Where the eye is beside that axis, as a share of it: east and north.
+        chart_slope: [f32; 2] = [0.0, 0.0];
+
         /// Lowest altitude of procedural clouds and rain, m.
         shell_base: f32 = 0.0;
         /// Highest.
         shell_top: f32 = 1.0;
+        /// Highest altitude of the first deck, m.
+        lower_top: f32 = 1.0;
+        /// How much the second deck shows, 0 where its cover is 0.
+        upper_shown: f32 = 0.0;
+        /// How far rain falls, as a share of its way to the ground.
+        rain_reach: f32 = 0.0;
 
         /// The shortest of the scales by which the base shape varies: of what `quality.leap` is a share, m.
         leap_scale: f32 = 1.0;
@@ -311,17 +323,32 @@ fn highest(params: &Params) -> f64 {
 }
 
 /// The distance between features of the noise and of each weather; so short where the cover may go from nothing to all of it
-/// within a texel of the user's map, or half the radius of the spot to keep clear, that leaps by a fifth of it reach half a
-/// texel, a quarter of that radius. Measured, islands of a texel: a whole one loses half as many again as big steps do.
+/// within a texel of the user's map that leaps by a fifth of it reach half a texel. Measured, islands of a texel: a whole one
+/// loses half as many again as big steps do.
 fn leap_scale(params: &Params) -> f32 {
     let of_weather = |(weather, _): (params::Weather, f32)| match &weather.map {
         Some(map) => 2.5 * weather.extent / map.width.max(map.height) as f32,
         None => weather.scale,
     };
-    let clear = params.clear_spot().1 as f32;
-    let clear = if clear > 0.0 { 1.25 * clear } else { f32::INFINITY };
-    let scale = params.weather_shares().into_iter().map(of_weather).fold(params.clouds.shape_scale, f32::min);
-    scale.min(clear)
+    params.weather_shares().into_iter().map(of_weather).fold(params.clouds.shape_scale, f32::min)
+}
+
+/// Clouds are this much narrower than the distance from one to the next (as in subrays.wgsl).
+const CLOUD_WIDTH: f32 = 0.5;
+
+/// As in chart.wgsl, where the chart ends near the antipode of the origin.
+const CHART_END: f64 = 0.01;
+
+/// What the scale of the chart at a point is the planet's diameter over, m (chart.wgsl).
+fn chart_reach(at: DVec3, radius: f64) -> f64 {
+    let from_centre = at + DVec3::Z * radius;
+    (from_centre.length() + from_centre.z).max(CHART_END * radius)
+}
+
+/// Where a point lies on the chart of weather and noises, m east and north of the origin (chart.wgsl).
+fn on_chart(at: DVec3, params: &Params) -> DVec2 {
+    let radius = f64::from(params.atmosphere.planet_radius);
+    2.0 * radius / chart_reach(at, radius) * at.truncate()
 }
 
 impl Frame {
@@ -359,6 +386,14 @@ impl Frame {
             _ => 2.0 * self.tan_half_fov / self.height as f32,
         };
         pixel * self.stride as f32
+    }
+
+    /// Whether pixels that look down on the clouds may be wider than those are (subrays.wgsl).
+    pub fn has_subrays(&self) -> bool {
+        // The farthest of them that the eye can see.
+        let away = self.power_top.max(0.0).sqrt();
+        let pixel = Self { stride: refine::spacing(self.sparse > 0), ..self.clone() }.marched_angle();
+        self.altitude > self.shell_top && away * pixel > CLOUD_WIDTH * self.leap_scale
     }
 
     /// How many pixels of the whole picture the clouds are known at, across and down (lattice.wgsl).
@@ -480,10 +515,16 @@ impl Frame {
         self.zenith = if distance > 0.0 { (from_centre / distance).as_vec3().to_array() } else { [0.0, 0.0, 1.0] };
         self.altitude = h as f32;
         self.centre_distance = distance as f32;
+        let reach = chart_reach(eye, radius);
+        self.chart_reach = reach as f32;
+        self.chart_slope = (eye.truncate() / reach).as_vec2().to_array();
         self.horizon_dip = (radius / (radius + h.max(0.0))).acos() as f32;
         // An eye under the ground is on it: were the ground to hide nothing from there, it would vanish at z = 0.
         self.power_ground = power(0.0).max(0.0);
         [self.shell_base, self.shell_top] = params.shell();
+        self.lower_top = params.lower_top();
+        self.upper_shown = params.upper_shown();
+        self.rain_reach = params.rain_reach();
         self.power_base = power(f64::from(self.shell_base));
         self.power_top = power(f64::from(self.shell_top));
         // The air that they shade: from where the eye is nearest to it to where the last of it goes under the horizon.
@@ -501,7 +542,10 @@ impl Frame {
             let upper = if params.has_upper_clouds() { params.upper_clouds.extinction } else { 0.0 };
             let rain = if params.has_rain_shafts() { params.clouds.rain_extinction } else { 0.0 };
             self.extinction = params.clouds.extinction.max(upper).max(rain);
-            let share = |extinction| if self.extinction > 0.0 { extinction / self.extinction } else { 0.0 };
+            // No share of what is there is 0: that it is thin does not change where it is marched.
+            const LEAST: f32 = 1e-20;
+            let share =
+                |extinction| if self.extinction > 0.0 { f32::max(extinction / self.extinction, LEAST) } else { 0.0 };
             [self.share, self.upper_share, self.rain_share] = [params.clouds.extinction, upper, rain].map(share);
             return;
         };
@@ -515,10 +559,10 @@ impl Frame {
     }
 
     /// The noises and the weather of the upper deck, which are scaled with it.
-    fn set_upper_wind(&mut self, eye: DVec3, params: &Params, carried: &Carried) {
+    fn set_upper_wind(&mut self, eye: DVec2, params: &Params, carried: &Carried) {
         let (clouds, upper) = (&params.clouds, &params.upper_clouds);
         let scale = f64::from(upper.scale);
-        let (shape, detail) = (eye.truncate() - carried.upper, eye.truncate() - carried.upper_detail);
+        let (shape, detail) = (eye - carried.upper, eye - carried.upper_detail);
         let plane = |at: DVec2, tile: f32| [wrap(at.x / scale, tile), wrap(at.y / scale, tile)];
         let volume = |at: DVec2, tile: f32| {
             let [x, y] = plane(at, tile);
@@ -541,13 +585,14 @@ impl Frame {
         let volume = |at: DVec2, scale: f32| [wrap(at.x, scale), wrap(at.y, scale), wrap(-carried.rise, scale)];
         let plane = |at: DVec2, scale: f32| [wrap(at.x, scale), wrap(at.y, scale)];
         self.wind_direction = compass(f64::from(wind.direction)).as_vec2().to_array();
-        let (shape, detail) = (eye.truncate() - carried.shape, eye.truncate() - carried.detail);
+        let eye = on_chart(eye, params);
+        let (shape, detail) = (eye - carried.shape, eye - carried.detail);
         self.shape_origin = volume(shape, clouds.shape_scale);
         self.detail_origin = volume(detail, clouds.detail_scale);
         self.curl_origin = plane(detail, clouds.curl_scale);
 
         // The middle of the weather map is the origin of the world, its first row the north.
-        let weather = eye.truncate() - carried.weather;
+        let weather = eye - carried.weather;
         let half = 0.5 * f64::from(params.weather.extent);
         let (extent, edge) = (params.weather.extent, params.weather.edge);
         self.weather_origin = [on_map(weather.x + half, extent, edge), on_map(half - weather.y, extent, edge)];
@@ -556,7 +601,7 @@ impl Frame {
         self.broad_origin = plane(DVec2::new(weather.x + broad, broad - weather.y), params.weather.broad_extent);
         let shares = params.broad_shares();
         self.broad_most = 0.5 * shares.total;
-        self.broad_scale = shares.scale();
+        self.broad_scale = shares.total;
         self.broad_bend = broad_weather::BEND * shares.bend * self.broad_scale;
         let ways = f64::from(broad_weather::BEND * params.weather.extent / params.weather.broad_extent);
         self.broad_stretch = (ways * broad_weather::STEEPEST) as f32;
@@ -565,12 +610,12 @@ impl Frame {
         self.set_upper_wind(eye, params, &carried);
 
         let (spot, radius) = params.clear_spot();
-        self.clear_at = (DVec2::from_array(spot) - eye.truncate()).as_vec2().to_array();
+        self.clear_at = (DVec2::from_array(spot) - eye).as_vec2().to_array();
         self.clear_radius = radius as f32;
 
         let along = compass(f64::from(high.direction));
         let across = DVec2::new(-along.y, along.x);
-        let at = DVec2::new(eye.truncate().dot(along), eye.truncate().dot(across)) - carried.high;
+        let at = DVec2::new(eye.dot(along), eye.dot(across)) - carried.high;
         self.high_origin = plane(at, high.scale);
         self.high_broad_origin = plane(at, HIGH_BROAD * high.scale);
         self.high_direction = along.as_vec2().to_array();

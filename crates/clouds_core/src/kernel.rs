@@ -79,8 +79,6 @@ pub(crate) struct Variant {
     pub rain_shafts: bool,
     /// Whether there is a second deck.
     pub upper: bool,
-    /// Whether a finer detail is added to the detail.
-    pub fine_detail: bool,
     /// Whether a larger map shifts the weather.
     pub broad: bool,
     /// Whether the profile by height is the user's table.
@@ -89,6 +87,8 @@ pub(crate) struct Variant {
     pub beams: bool,
     /// Whether there is a scene of the user's.
     pub scene: bool,
+    /// Whether pixels may be wider than clouds.
+    pub subrays: bool,
     /// Whether the clouds are known at the corners of cells of pixels alone.
     pub sparse: bool,
     /// Whether there are light samples that see the detail.
@@ -129,11 +129,11 @@ impl Variant {
             rainy: params.is_rainy(),
             rain_shafts: params.has_rain_shafts(),
             upper: params.has_upper_clouds(),
-            fine_detail: params.clouds.fine_detail > 0.0,
             broad: params.has_broad_weather(),
             profile_table: params.clouds.profile.is_some() && params.volume.is_none(),
             beams: false,
             scene: false,
+            subrays: false,
             sparse: false,
             light_detail: quality.cheap_light > 0.0,
             light_cheap: quality.cheap_light < 1.0
@@ -163,6 +163,7 @@ impl Variant {
             camera: frame.camera_kind,
             beams: frame.beams > 0,
             scene: frame.scene > 0,
+            subrays: params.volume.is_none() && frame.has_subrays(),
             sparse: frame.sparse > 0,
             ..Self::new(params, quality)
         }
@@ -182,11 +183,11 @@ impl Variant {
             ("RAINY", switch(self.rainy)),
             ("RAIN_SHAFTS", switch(self.rain_shafts)),
             ("UPPER", switch(self.upper)),
-            ("FINE_DETAIL", switch(self.fine_detail)),
             ("BROAD_WEATHER", switch(self.broad)),
             ("PROFILE_TABLE", switch(self.profile_table)),
             ("BEAMS", switch(self.beams)),
             ("SCENE", switch(self.scene)),
+            ("SUBRAYS", switch(self.subrays)),
             ("SPARSE", switch(self.sparse)),
             ("STRIDE", f64::from(reproject::stride(self.sparse))),
             ("LIGHT_DETAIL", switch(self.light_detail)),

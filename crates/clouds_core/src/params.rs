@@ -116,7 +116,8 @@ params! {
         cumulonimbus_top: f32 = 8000.0, in 1..=25000 "m";
         /// How far the tops of cumulonimbus spread.
         anvil: f32 = 0.5, in 0..=1 "";
-        /// Extinction of the rain that is seen below the clouds where it is heaviest; 0 hides it.
+        /// Extinction of the rain that is seen below the clouds where it is heaviest; 0 hides it. What is thinner than clean air
+        /// (1e-5) evaporates before it reaches the ground.
         rain_extinction: f32 = 0.0, in 0..=1 "1/m";
         /// Extinction where the density is 1.
         extinction: f32 = 0.2, in 0..=100000000 "1/m";
@@ -175,7 +176,8 @@ params! {
 
     /// The weather map: where the clouds stand.
     Weather {
-        /// Width of the square that one map covers, about the origin of the world.
+        /// Width of the square that one map covers, about the origin of the world. It lies on the planet in stereographic
+        /// projection: true at the origin, in proportion anywhere.
         extent: f32 = 60000.0, in 100..=10000000 "m";
         /// What lies beyond that square: the map again, its mirror image, or what is at its edge.
         edge: Edge = Edge::Repeat;
@@ -192,7 +194,8 @@ params! {
         /// How much the type of cloud varies from place to place; 0 makes it the same everywhere.
         type_variety: f32 = 0.9, in 0..=2 "";
         /// How much a second, larger map shifts the weather, by seed or `broad_map`, so that no part of the sky looks like
-        /// another; 0 leaves the first map as it is. The baked one leaves a `map` of yours alone.
+        /// another; 0 leaves the first map as it is. From 0.3 on the baked one also bends it in full. It leaves a `map` of
+        /// yours alone.
         broad_variety: f32 = 0.3, in 0..=1 "";
         /// Width of the square that the larger map covers; beyond it, that repeats.
         broad_extent: f32 = 430000.0, in 100..=10000000 "m";
@@ -375,12 +378,13 @@ params! {
         /// How many steps one step outside cloud is long; on a hit the march goes back.
         big_step: u32 = 5, in 1..=16 "";
         /// How far a ray may leap through clear air, beyond `big_step`: as a share of `clouds.shape_scale` (of
-        /// `weather.scale` or two and a half pixels of `weather.map`, if that is less) for each unit that the base shape lacks of being cloud. On a hit the march goes back. 0 leaps no
-        /// farther than `big_step`; none does where that is 1, in grids and with rain in sight.
+        /// `weather.scale` or two and a half pixels of `weather.map`, if that is less) for each unit that the base shape lacks of
+        /// being cloud. On a hit the march goes back. 0 leaps no farther than `big_step`; none does where that is 1, in grids and
+        /// in rain.
         leap: f32 = 0.2, in 0..=1 "";
         /// Full samples of zero in a row after which samples are cheap again (nubis2015: 6).
         empty_samples: u32 = 6, in 1..=4096 "";
-        /// Light samples toward the sun, besides the far one. Where they spread to the end of the clouds, a third of them is
+        /// Light samples toward the sun, besides the far one. Where they spread to the end of the clouds, there is a third more
         /// for a second deck above the point.
         light_steps: u32 = 16, in 1..=128 "";
         /// Share of a pixel's cloud that is lit as one, by the light samples of one place in it: samples in a row are lit
@@ -409,10 +413,8 @@ params! {
         contrast: f32 = 0.3, in 0..=1 "";
         /// Whether each ray starts at a blue-noise offset of up to one step.
         jitter: bool = true;
-        /// Farthest distance at which clouds are marched.
-        view_distance: f32 = 400000.0, in 1000..=1000000000 "m";
         /// Largest relative change of a pixel when all steps are halved; they are until it is met. It replaces everything
-        /// above but `view_distance` by an integration that converges, and sun rays go to the end of the clouds; 0
+        /// above by an integration that converges, and sun rays go to the end of the clouds; 0
         /// marches with the settings above.
         tolerance: f32 = 0.0, in 0..=1 "";
         /// Paths traced for each pixel (light model `path`).
@@ -455,19 +457,37 @@ pub enum BroadSource {
 /// What the larger weather map is made of.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BroadShares {
-    /// Maps and their weights: the share of a weather times its variety.
+    /// Maps and their weights, which are 1 together: the share of a weather times its variety. One that comes with next to
+    /// no weight then leaves the others the bits that they have alone.
     pub maps: Vec<(BroadSource, f32)>,
-    /// The sum of the weights.
+    /// What the texels are multiplied with: the sum of those shares times varieties.
     pub total: f32,
     /// How much the smaller map is bent, for each weight of a baked map: 1 in all where every weather has one.
     pub bend: f32,
 }
 
-impl BroadShares {
-    /// What the texels are multiplied with: of a mixture they hold their weights.
-    pub fn scale(&self) -> f32 {
-        if let [(_, only)] = self.maps[..] { only } else { 1.0 }
-    }
+/// The variety from which on the larger map bends the smaller one in full: the default.
+const FULL_BEND: f32 = 0.3;
+
+/// The cover up to which a deck shows nothing: fewer than one texel of noise in ten thousand rises above 1 less twice that.
+const UNSEEN: f32 = 0.01;
+
+/// Extinction of rain that evaporates at once, and of rain that reaches the ground, 1/m: that of clean air is 1.2e-5
+/// (Rayleigh scattering at 550 nm, sea level).
+const FAINTEST_RAIN: [f32; 2] = [1.5e-6, 1e-5];
+
+fn lerp(a: f32, b: f32, share: f32) -> f32 {
+    a + share * (b - a)
+}
+
+fn smoothstep(low: f32, high: f32, v: f32) -> f32 {
+    let x = ((v - low) / (high - low)).clamp(0.0, 1.0);
+    x * x * (3.0 - 2.0 * x)
+}
+
+/// How much room a deck of some cover has, before it shows: 0 without any, 1 from `UNSEEN` on.
+fn shown(cover: f32) -> f32 {
+    smoothstep(0.0, UNSEEN, cover)
 }
 
 impl Params {
@@ -592,7 +612,7 @@ impl Params {
 
     /// Whether rain is seen below the clouds.
     pub fn has_rain_shafts(&self) -> bool {
-        self.is_rainy() && self.clouds.rain_extinction > 0.0
+        self.rain_reach() > 0.0
     }
 
     /// Whether a second, larger map shifts the weather.
@@ -636,7 +656,7 @@ impl Params {
                 continue;
             }
             if let BroadSource::Seed(_) = source {
-                shares.bend += share;
+                shares.bend += share * (weather.broad_variety / FULL_BEND).min(1.0);
                 baked += weight;
             }
             shares.total += weight;
@@ -647,21 +667,54 @@ impl Params {
         }
         // The weights are on the bend as on the shifts.
         shares.bend = if baked > 0.0 { shares.bend / baked } else { 0.0 };
+        for (_, weight) in &mut shares.maps {
+            *weight /= shares.total;
+        }
         shares
     }
 
     /// The lowest and the highest altitude at which there can be procedural clouds or visible rain, m.
+    ///
+    /// Continuous in all that can be switched on: steps lie by it, and where it leapt all clouds would change with what is
+    /// switched on beside them.
     pub fn shell(&self) -> [f32; 2] {
-        let (clouds, upper) = (&self.clouds, &self.upper_clouds);
-        let lower = if clouds.coverage > 0.0 || !self.has_upper_clouds() {
-            // Where it rains less there is neither tower nor anvil (density.wgsl).
-            let storms = self.is_rainy() && clouds.precipitation > 0.2;
-            let base = if self.has_rain_shafts() { 0.0 } else { clouds.base };
-            [base, if storms { clouds.top.max(clouds.cumulonimbus_top) } else { clouds.top }]
-        } else {
-            [upper.base, upper.top]
-        };
-        if self.has_upper_clouds() { [lower[0], lower[1].max(upper.top)] } else { lower }
+        let lower = [self.rain_base(), self.lower_top()];
+        if !self.has_upper_clouds() {
+            return lower;
+        }
+        let upper = &self.upper_clouds;
+        let above = lower[1].max(upper.top);
+        let shown = shown(self.clouds.coverage);
+        [lerp(upper.base, lower[0], shown), lerp(above, lerp(lower[1], above, self.upper_shown()), shown)]
+    }
+
+    /// How much room the second deck has.
+    pub fn upper_shown(&self) -> f32 {
+        shown(self.upper_clouds.coverage)
+    }
+
+    /// The highest altitude of the first deck, m: it grows with the towers that the heaviest rain makes, and before its anvils
+    /// spread (`tower` and `anvil` of density.wgsl).
+    pub fn lower_top(&self) -> f32 {
+        let clouds = &self.clouds;
+        if !self.is_rainy() {
+            return clouds.top;
+        }
+        let tallest = clouds.top.max(clouds.cumulonimbus_top);
+        let anvil = 0.6 - 0.5 * clouds.anvil;
+        let grown =
+            smoothstep(0.5, 0.9, clouds.precipitation).max(smoothstep(anvil - 0.1, anvil, clouds.precipitation));
+        lerp(clouds.top, tallest, grown)
+    }
+
+    /// How far rain falls, as a share of its way to the ground: what is thinner than clean air evaporates on its way.
+    pub fn rain_reach(&self) -> f32 {
+        if self.is_rainy() { smoothstep(FAINTEST_RAIN[0], FAINTEST_RAIN[1], self.clouds.rain_extinction) } else { 0.0 }
+    }
+
+    /// The lowest altitude of rain where it is heaviest (`rain_below` of density.wgsl), or of the first deck, m.
+    fn rain_base(&self) -> f32 {
+        self.clouds.base * (1.0 - (self.rain_reach() * self.clouds.precipitation / 0.3).min(1.0))
     }
 
     /// What the weather map is made of: maps by what they depend on, and their shares, which are 1 together.
@@ -743,7 +796,7 @@ impl Quality {
                 path_samples: 256,
                 ..balanced
             },
-            "reference" => Self { tolerance: 1e-3, path_samples: 1024, view_distance: 1e9, ..balanced },
+            "reference" => Self { tolerance: 1e-3, path_samples: 1024, ..balanced },
             // "A sample and five more in a cone"; the sixth is the far one.
             "nubis2015" => published,
             // Options A to D of the text: big steps of three, ten empty samples, light samples always full.
@@ -769,7 +822,8 @@ impl Quality {
         let steps = self.steps_zenith.max(self.steps_horizon) * if self.step_growth > 0.0 { 2 } else { 1 };
         // What is lit as one has gathered more than its share; the rest of the ray is one more.
         let groups = (1.0 / self.light_share + 1.0).min(steps as f32) as u32;
-        let turns = 2 * steps + groups * (1 + self.light_steps);
+        // A second deck gets a third more light samples (light.wgsl).
+        let turns = 2 * steps + groups * (1 + self.light_steps + self.light_steps.div_ceil(3));
         if turns > 40_000 {
             return Err(Error::parameter(
                 "quality.light_steps",

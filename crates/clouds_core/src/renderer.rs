@@ -770,7 +770,7 @@ impl Renderer {
         expression: &str,
         inputs: &[[f32; 4]],
         params: &Params,
-        time: f64,
+        (eye, time): (DVec3, f64),
         interrupt: Interrupt<'_>,
     ) -> Result<Vec<[f32; 4]>> {
         check_fork()?;
@@ -784,7 +784,7 @@ impl Renderer {
         let linked =
             Linked::from_source(&source).map_err(|error| Error::parameter("imports", error, "shader names"))?;
         let kernel = Kernel::from_linked(&self.gpu, &linked, "probe", Variant::new(params, &self.quality))?;
-        let camera = Camera::equirect(DVec3::ZERO)?;
+        let camera = Camera::equirect(eye)?;
         // At once, so that what is timed fills the device.
         self.run_points(&kernel, &camera, inputs, params, time, 1 << 20, interrupt)
     }

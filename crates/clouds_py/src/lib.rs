@@ -552,6 +552,7 @@ impl Renderer {
         array(py, texels, &[height as usize, width as usize, 3])
     }
 
+    #[expect(clippy::too_many_arguments, reason = "what an answer depends on")]
     fn probe<'py>(
         &self,
         py: Python<'py>,
@@ -559,12 +560,14 @@ impl Renderer {
         expression: &str,
         inputs: Vec<[f32; 4]>,
         params: &Bound<'_, PyAny>,
+        eye: [f64; 3],
         time: f64,
     ) -> PyResult<Bound<'py, PyAny>> {
         let _inside = exit::enter(py);
         let params: Params = params_from_python(params)?;
-        let answers =
-            detached(py, |interrupt| lock(&self.core).probe(&imports, expression, &inputs, &params, time, interrupt))?;
+        let answers = detached(py, |interrupt| {
+            lock(&self.core).probe(&imports, expression, &inputs, &params, (eye.into(), time), interrupt)
+        })?;
         let count = answers.len();
         array(py, answers.into_flattened(), &[count, 4])
     }

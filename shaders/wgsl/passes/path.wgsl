@@ -10,6 +10,7 @@
 #import random
 #import atmosphere
 #import scene_depth
+#import subrays
 
 // Stages of a pixel.
 const START = 0u; // of a path
@@ -34,7 +35,8 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
     }
     let index = active_rays[id.x];
     let pixel = vec2u(index % frame.width, frame.sheet_row + index / frame.width);
-    let view = view_direction(vec2f(pixel) + 0.5);
+    let middle = view_direction(vec2f(pixel) + 0.5);
+    let rays = rays_through(middle.xyz);
     let pixel_size = pixel_width();
     let sunlit = is_sunlit();
 
@@ -44,6 +46,11 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
     for (; turns < frame.budget && ray.stage != DONE; turns++) {
         if ray.stage == START {
             ray.origin = vec3f(0.0);
+            var view = middle;
+            if SUBRAYS {
+                let place = random3(vec3u(pixel.y * frame.width + pixel.x, frame.first_sample + ray.done, 0u), 0u).xy;
+                view = vec4f(view_direction(ray_place(pixel, place, rays)).xyz, middle.w);
+            }
             ray.direction = view.xyz;
             ray.flight = view_flight(view, scene_distance(pixel));
             ray.x = 0.0;
@@ -144,11 +151,8 @@ fn sun_at(p: vec3f) -> vec3f {
 
 fn view_flight(view: vec4f, limit: f32) -> vec4f {
     let s = stretches_before(cloud_stretches(view.xyz), limit);
-    let room = max(quality.view_distance - s.start, 0.0);
     let clear = view.w == 0.0 || (!VOLUME && !UPPER && params.clouds.coverage <= 0.0);
-    let first = min(s.first, room);
-    let cut = vec4f(s.start, first, s.gap, min(s.second, room - first));
-    return select(cut, vec4f(0.0), clear);
+    return select(vec4f(s.start, s.first, s.gap, s.second), vec4f(0.0), clear);
 }
 
 // The stretches of a flight that starts at a point, to the ground at most.

@@ -42,8 +42,7 @@ fn reference(@builtin(global_invocation_id) id: vec3u) {
     let view = view_direction(vec2f(pixel) + 0.5);
     let direction = view.xyz;
     let stretches = stretches_before(cloud_stretches(direction), scene_distance(pixel));
-    let room = max(quality.view_distance - stretches.start, 0.0);
-    let length = select(0.0, min(stretches.first + stretches.second, room), view.w > 0.0);
+    let length = select(0.0, stretches.first + stretches.second, view.w > 0.0);
     let empty = length <= 0.0 || (!VOLUME && !UPPER && params.clouds.coverage <= 0.0);
     let one_minus_mu = one_minus_cos(direction, frame.sun_direction);
     let sunlit = is_sunlit();

@@ -11,6 +11,8 @@
 const MAP_STEPS = 2048.0;
 const GROUND_STEPS = 48.0;
 const FEWEST = 12.0;
+// Most places that a texel of the ground is the mean of.
+const MOST_PLACES = 16.0;
 // Behind this optical depth is less than a thousandth of the sun.
 const DARK = 7.0;
 
@@ -44,8 +46,20 @@ fn shadow_ground(
     let texel = shadow_texel(level);
     let at = (vec2f(vec2u(id.x, id.y % SHADOW_SIDE)) + 0.5 - 0.5 * f32(SHADOW_SIDE)) * texel;
     let fine = select(max(2.0 * finest_feature(), texel), max(frame.voxel, 0.5 * texel), VOLUME);
-    let depth = cloud_depth_to_sun(ground_place(at), fine, GROUND_STEPS);
-    textureStore(map_out, id.xy, exp(-depth));
+    // Of texels that are wider than clouds the mean of several places, in a low-discrepancy sequence (R2).
+    let width = texel / frame.leap_scale;
+    let places = select(clamp(ceil(width * width), 1.0, MOST_PLACES), 1.0, VOLUME);
+    var sum = vec4f(0.0);
+    var k = 0.0;
+    loop {
+        let aside = texel * (fract(0.5 + k * vec2f(0.7548776662, 0.5698402910)) - 0.5);
+        sum += exp(-cloud_depth_to_sun(ground_place(at + aside), fine, GROUND_STEPS));
+        k += 1.0;
+        if k >= places {
+            break;
+        }
+    }
+    textureStore(map_out, id.xy, sum / places);
 }
 
 // Lets each level go over into the next in the outer fifth of its reach, and the last into its mean. Where there are finer
@@ -91,8 +105,7 @@ fn shadow_mean(@builtin(local_invocation_id) id: vec3u) {
 
 // Optical depth of the marched clouds from a point to the sun, and of what of them is over a quarter, a half and three quarters
 // of their height, from the far end on, so that what is behind `DARK` is dark in all of them. In steps of `fine` metres, or
-// longer ones. Each reads the finest noise: coarser levels of detail make clouds smaller, and the ground of `fair_weather` 3 %
-// too bright in the mean, not 1 %.
+// longer ones.
 fn cloud_depth_to_sun(p: vec3f, fine: f32, most: f32) -> vec4f {
     let s = cloud_stretches_from(p, frame.sun_direction);
     let length = s.first + s.second;
@@ -120,7 +133,7 @@ fn cloud_depth_to_sun(p: vec3f, fine: f32, most: f32) -> vec4f {
             }
         }
         let above = vec4f(height_among_clouds(q, altitude_at(q))) >= vec4f(-1e30, 0.25, 0.5, 0.75);
-        let here = frame.extinction * step * cloud_density(column, cloud_shape(column, 0.0), 0.0);
+        let here = frame.extinction * step * cloud_density(column, cloud_shape(column), 0.0);
         depth += select(vec4f(0.0), vec4f(here), above);
         if i >= count || depth.x > DARK {
             break;

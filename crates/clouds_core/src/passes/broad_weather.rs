@@ -36,7 +36,6 @@ impl BroadWeather {
             // A kernel that could read a texture must be given one.
             let texture = match &*maps {
                 [] => ctx.gpu.texture("broad_weather", [1; 3], 1),
-                // Its weight is in the frame.
                 [(only, _)] => only.clone(),
                 maps => mix(ctx, maps, size, Edge::Repeat)?,
             };

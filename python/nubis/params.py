@@ -451,8 +451,8 @@ class Atmosphere(Block):
     Attributes
     ----------
     enabled : bool
-        Whether there is air; without it the sky is black and sunlight arrives undimmed. Allowed:
-        True or False.
+        Whether there is air; without it the sky is black, day and night, and sunlight arrives
+        undimmed. Allowed: True or False.
     planet_radius : float
         Radius of the planet (Earth 6 371 000, thesis2018 400 000). Allowed: a number from 10000 to
         1000000000 m.
@@ -467,6 +467,10 @@ class Atmosphere(Block):
         Whether clouds cast shadows on the air: crepuscular rays. Allowed: True or False.
     ground_albedo : tuple[float, float, float]
         Albedo of the ground. Allowed: 3 numbers from 0 to 1.
+    night : tuple[float, float, float]
+        Radiance of the night's own light above the air, airglow and stars, which is there by day
+        too: 20.9, 21.6 and 22.6 magnitudes a square arcsecond in R, V and B (Patat 2003) beside a
+        sun of 10 and of -27.1, -26.74 and -26.09. Allowed: 3 numbers from 0 to 1000000.
     """
 
     enabled: bool = True
@@ -476,6 +480,7 @@ class Atmosphere(Block):
     ground_shadows: bool = True
     beams: bool = True
     ground_albedo: tuple[float, float, float] = (0.1, 0.12, 0.07)
+    night: tuple[float, float, float] = (0.000000027, 0.00000002, 0.000000014)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -22,6 +22,7 @@ override PROFILE_TABLE: bool = false; // the profile by height is the user's tab
 override BEAMS: bool = false; // clouds cast shadows on the air
 override SCENE: bool = false; // there is a scene of the user's among the clouds
 override SPARSE: bool = false; // the clouds are known at the corners of cells of pixels alone, see lattice.wgsl
+override WIDE_PHASE: bool = false; // the phase function varies within a pixel
 override LIGHT_DETAIL: bool = true; // there are light samples that see the detail
 override LIGHT_CHEAP: bool = true; // there are light samples that do not
 

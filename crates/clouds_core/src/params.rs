@@ -322,7 +322,7 @@ params! {
 
     /// The planet and its air.
     Atmosphere {
-        /// Whether there is air; without it the sky is black and sunlight arrives undimmed.
+        /// Whether there is air; without it the sky is black, day and night, and sunlight arrives undimmed.
         enabled: bool = true;
         /// Radius of the planet (Earth 6 371 000, thesis2018 400 000).
         planet_radius: f32 = 6371000.0, in 10000..=1000000000 "m";
@@ -336,6 +336,9 @@ params! {
         beams: bool = true;
         /// Albedo of the ground.
         ground_albedo: [f32; 3] = [0.10, 0.12, 0.07], in 0..=1 "";
+        /// Radiance of the night's own light above the air, airglow and stars, which is there by day too: 20.9, 21.6 and 22.6
+        /// magnitudes a square arcsecond in R, V and B (Patat 2003) beside a sun of 10 and of -27.1, -26.74 and -26.09.
+        night: [f32; 3] = [2.7e-8, 2.0e-8, 1.4e-8], in 0..=1000000 "";
     }
 
     /// The numerical method: how accurately a sky is computed, never how it looks.

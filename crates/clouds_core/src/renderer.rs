@@ -107,11 +107,14 @@ impl Method {
         let composite: &[_] = if self.by_cells(frame, quality) { &composite::CELLS } else { &composite::WHOLE };
         let composite = composite.iter().map(with(composite::variant(variant, frame, layers)));
         let clouds = clouds.iter().map(with(variant));
+        let discs = Variant { discs: true, ..composite::variant(variant, frame, layers) };
+        let discs = (!frame.disc_pixels(params).is_empty()).then_some(("composite", "composite_discs", discs));
         bakes
             .chain(shadow::kernels(frame, variant))
             .chain(beams::kernel(variant))
             .chain(clouds)
             .chain(composite)
+            .chain(discs)
             .collect()
     }
 
@@ -352,7 +355,7 @@ impl Renderer {
             let parts = Parts { marched, backdrop, refined, out: composed };
             frame.rows = sheet.len() as u32;
             let mut ctx = Context { gpu, uniforms: scene.uniforms, variant: scene.variant, timings, interrupt };
-            compose_sheet(&mut ctx, &scene, &mut frame, &mut self.pixel_pace, &parts, by_cells, all)?;
+            compose_sheet(&mut ctx, &scene, &mut frame, params, &mut self.pixel_pace, &parts, by_cells, all)?;
             let mut work = gpu.work();
             let pixels = u64::from(width) * sheet.len() as u64;
             work.download(&composed.image, 0, 16 * pixels);
@@ -550,7 +553,7 @@ impl Renderer {
         let parts = Parts { marched: &now.marched, backdrop, refined, out: composed };
         let mut ctx = Context { gpu, uniforms: scene.uniforms, variant: scene.variant, timings, interrupt };
         let by_cells = Method::March.by_cells(&frame, quality);
-        compose_sheet(&mut ctx, &scene, &mut frame, &mut self.pixel_pace, &parts, by_cells, false)?;
+        compose_sheet(&mut ctx, &scene, &mut frame, params, &mut self.pixel_pace, &parts, by_cells, false)?;
         let mut work = gpu.work();
         if let Some(screen) = screen {
             frame.first_row = 0;
@@ -1128,8 +1131,33 @@ fn march_listed(
     })
 }
 
-/// Composes the sheet of `frame`: cells, then the pixels of those that are not smooth, or all of them.
+/// Composes the sheet of `frame`: cells, then the pixels of those that are not smooth, or all of them; then those in which a disc
+/// of light is seen.
+#[expect(clippy::too_many_arguments, reason = "what a picture is composed of")]
 fn compose_sheet(
+    ctx: &mut Context<'_>,
+    scene: &Scene<'_>,
+    frame: &mut Frame,
+    params: &Params,
+    pace: &mut Pace,
+    parts: &Parts<'_>,
+    by_cells: bool,
+    layers: bool,
+) -> Result<()> {
+    let discs = frame.disc_pixels(params);
+    compose_all(ctx, scene, frame, pace, parts, by_cells, layers)?;
+    for [first_column, first_row, columns, rows] in discs {
+        let frame = Frame { first_column, first_row, columns, rows, ..frame.clone() };
+        scene.uniforms.upload_frame(ctx.gpu, &frame);
+        let mut work = ctx.gpu.work();
+        composite::run_discs(ctx.gpu, &mut work, scene, &frame, parts, layers)?;
+        work.submit(ctx.timings, ctx.interrupt)?;
+    }
+    Ok(())
+}
+
+/// The same but for discs.
+fn compose_all(
     ctx: &mut Context<'_>,
     scene: &Scene<'_>,
     frame: &mut Frame,

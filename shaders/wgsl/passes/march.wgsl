@@ -46,7 +46,7 @@ fn march_cell(index: u32, within: vec2f) -> vec2f {
     let view = view_direction(vec2f(pixel) + 0.5);
     var cloud = Cloud(vec3f(0.0), 1.0, -1.0, NOWHERE);
     if view.w > 0.0 {
-        cloud = march_ray(view.xyz, scene_distance(pixel), ray_offset(pixel), within);
+        cloud = march_ray(view.xyz, pixel, scene_distance(pixel), ray_offset(pixel), within);
     }
     clouds[index] = vec4f(cloud.radiance, cloud.transmittance);
     cloud_depth[index] = cloud.depth;
@@ -226,7 +226,7 @@ fn way_to_decks(direction: vec3f, leap: f32, at: Sample) -> f32 {
 // Steps for each that a big step leaps over: where those leap over none, nothing does.
 const LONGEST_LEAP = 16.0;
 
-fn march_ray(direction: vec3f, limit: f32, offset: f32, within: vec2f) -> Cloud {
+fn march_ray(direction: vec3f, pixel: vec2u, limit: f32, offset: f32, within: vec2f) -> Cloud {
     let stretches = stretches_before(cloud_stretches(direction), limit);
     let room = max(quality.view_distance - stretches.start, 0.0);
     let length = min(stretches.first + stretches.second, room);
@@ -238,11 +238,11 @@ fn march_ray(direction: vec3f, limit: f32, offset: f32, within: vec2f) -> Cloud 
         return Cloud(vec3f(0.0), 1.0, -1.0, NOWHERE);
     }
     let steps = ray_steps(stretches.start, length, direction);
-    let pixel_size = pixel_width();
+    let pixel_size = pixel_width(direction);
     let sunlit = is_sunlit();
     let nodes = ray_nodes(stretches.start, stretch_distance(stretches, length) - stretches.start);
 
-    let one_minus_mu = one_minus_cos(direction, frame.sun_direction);
+    let turned = seen_turn(direction, vec2f(pixel));
     var sum = Gathered();
 
     let big = quality.big_step;
@@ -326,7 +326,7 @@ fn march_ray(direction: vec3f, limit: f32, offset: f32, within: vec2f) -> Cloud 
                 if SUNLIT && sunlit {
                     depth_to_sun = optical_depth_to_sun(lit.distance * direction, lit.opacity, lit.width);
                 }
-                let sun = sun_scattering(depth_to_sun, lit.precipitation, one_minus_mu);
+                let sun = seen_scattering(depth_to_sun, lit.precipitation, turned);
                 sum = gather(sum, nodes, lit.weight, sun, lit.above, lit.distance);
                 if count == 0u {
                     break;

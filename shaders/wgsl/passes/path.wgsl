@@ -35,7 +35,8 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
     let index = active_rays[id.x];
     let pixel = vec2u(index % frame.width, frame.sheet_row + index / frame.width);
     let view = view_direction(vec2f(pixel) + 0.5);
-    let pixel_size = pixel_width();
+    let seen = seen_turn(view.xyz, vec2f(pixel));
+    let pixel_size = pixel_width(view.xyz);
     let sunlit = is_sunlit();
 
     var ray = path_rays[index];
@@ -98,7 +99,7 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
                 if ray.scatterings > quality.path_scatterings {
                     ray = path_ended(ray);
                 } else if sunlit {
-                    let phase = path_phase(one_minus_cos(direction, frame.sun_direction));
+                    let phase = select(model_phase(one_minus_cos(direction, frame.sun_direction)), seen.phase, ray.scatterings == 1u);
                     ray.sunlight = ray.throughput * phase * sun_at(p);
                     ray.shadow = 1.0;
                     ray.flight = flight_from(p, frame.sun_direction);
@@ -194,13 +195,6 @@ fn scattered_on(given: PathRay, pixel: vec2u) -> PathRay {
     return ray;
 }
 
-fn path_phase(one_minus_mu: f32) -> f32 {
-    if PHASE == PHASE_HENYEY_GREENSTEIN {
-        return henyey_greenstein(one_minus_mu, params.light.g);
-    }
-    return droplet_phase(one_minus_mu);
-}
-
 // Out of the clouds: to the eye's background if it met none, else to the sky or to the ground.
 fn escaped(given: PathRay, pixel: vec2u) -> PathRay {
     var ray = given;
@@ -208,12 +202,11 @@ fn escaped(given: PathRay, pixel: vec2u) -> PathRay {
         return path_ended(ray);
     }
     ray.light += ray.throughput * params.light.ambient;
-    if !AIR {
-        return path_ended(ray);
-    }
     let ground = hit_ground_from(ray.origin, ray.direction);
     if !ground.enters {
-        ray.light += ray.throughput * params.light.ambient_gain * sky_radiance(ray.direction);
+        if AIR {
+            ray.light += ray.throughput * params.light.ambient_gain * sky_radiance(ray.direction);
+        }
         return path_ended(ray);
     }
     ray.scatterings += 1u;

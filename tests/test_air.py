@@ -486,3 +486,44 @@ def test_night_is_its_parameter_above_the_air(renderer):
     np.testing.assert_allclose(seen, through * night, rtol=0.01)
     double = sky(renderer, dark.with_(**{"atmosphere.night": tuple(2 * v for v in night)}), up)
     np.testing.assert_allclose(double, 2 * seen, rtol=1e-3)
+
+
+HAZES = [0.0, 1.0, 10.0, 20.0, 50.0, 94.0, 100.0]
+
+
+def test_optical_depth_of_haze():
+    """0.00533 for each unit of haze straight up: what the manual says a clear day is."""
+    depth = []
+    for haze in HAZES:
+        through = probe(
+            "vec4f(air_transmittance(x.x, x.y), 1.0)",
+            np.array([[0.0, 1.0]]),
+            params=clear(**{"atmosphere.haze": haze}),
+            imports=["atmosphere"],
+        )[0, :3]
+        depth.append(-np.log(through.astype(np.float64)))
+    added = np.array(depth) - depth[0]
+    # Extinction at the ground times the scale height (Hillaire 2020).
+    expected = np.array(HAZES) * 4.440e-6 * 1200.0
+    np.testing.assert_allclose(added, expected[:, None] + np.zeros(3), rtol=0.01, atol=2e-4)
+    assert expected[HAZES.index(94.0)] == pytest.approx(0.5, abs=0.002)
+
+
+@pytest.mark.parametrize("elevation", [60.0, 3.0, -4.0])
+def test_every_haze_renders(renderer, elevation):
+    """To the end of the range: no hole, and ever less of a dark ground is told from the sky."""
+    camera = looking((0.0, 1.0, 0.0), 300.0, 40.0)
+    contrast = []
+    for haze in HAZES:
+        params = nubis.Params().with_(
+            **{"atmosphere.haze": haze, "sun.elevation": elevation, "sun.azimuth": 90.0}
+        )
+        picture = renderer(32, 24).render(camera, params)
+        assert np.isfinite(picture).all() and picture.min() >= 0
+        clear_sky = renderer(8, 64).render(
+            camera, params.with_(**CLEAR, **{"atmosphere.ground_albedo": (0.0,) * 3})
+        )
+        above, below = clear_sky[31, :, 1].mean(), clear_sky[33, :, 1].mean()
+        contrast.append(abs(above - below) / max(above, below))
+        assert clear_sky[..., :3].mean() > 0
+    assert all(after < before + 0.01 for before, after in pairwise(contrast))

@@ -457,7 +457,9 @@ class Atmosphere(Block):
         Radius of the planet (Earth 6 371 000, thesis2018 400 000). Allowed: a number from 10000 to
         1000000000 m.
     haze : float
-        Haze: amount of aerosol, 1 is a clear day. Allowed: a number from 0 to 20.
+        Haze: amount of aerosol. Each unit is an optical depth of 0.0053 straight up from the
+        ground, at 550 nm as at all wavelengths: 1 is air as clear as over the Antarctic, 10 to 20 a
+        clear day (0.05 to 0.1), 94 thick haze (0.5). Allowed: a number from 0 to 100.
     aerial_perspective : float
         How much air stands between the eye and the clouds: 1 is physical, 0 none. Allowed: a number
         from 0 to 10.

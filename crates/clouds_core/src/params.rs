@@ -326,8 +326,9 @@ params! {
         enabled: bool = true;
         /// Radius of the planet (Earth 6 371 000, thesis2018 400 000).
         planet_radius: f32 = 6371000.0, in 10000..=1000000000 "m";
-        /// Haze: amount of aerosol, 1 is a clear day.
-        haze: f32 = 1.0, in 0..=20 "";
+        /// Haze: amount of aerosol. Each unit is an optical depth of 0.0053 straight up from the ground, at 550 nm as at all
+        /// wavelengths: 1 is air as clear as over the Antarctic, 10 to 20 a clear day (0.05 to 0.1), 94 thick haze (0.5).
+        haze: f32 = 1.0, in 0..=100 "";
         /// How much air stands between the eye and the clouds: 1 is physical, 0 none.
         aerial_perspective: f32 = 1.0, in 0..=10 "";
         /// Whether clouds cast shadows on the ground that is seen.

@@ -28,13 +28,20 @@ from nubis._renderer import Adapter, Renderer, adapters, quality
 from nubis._scene_depth import distance_from_z
 from nubis._scenes import scenes
 from nubis._shadow import ShadowMap, SunVisibility
-from nubis._units import LUMINOUS_EFFICACY, SOLAR_IRRADIANCE, luminance
+from nubis._units import (
+    LUMINOUS_EFFICACY,
+    LUNAR_IRRADIANCE,
+    NIGHT_RADIANCE,
+    SOLAR_IRRADIANCE,
+    luminance,
+)
 from nubis._weather import WeatherBlend, WeatherChange
 from nubis.params import (
     Atmosphere,
     Clouds,
     HighClouds,
     Light,
+    Moon,
     Params,
     Quality,
     Sun,
@@ -48,6 +55,8 @@ __version__ = "0.1.0"
 
 __all__ = [
     "LUMINOUS_EFFICACY",
+    "LUNAR_IRRADIANCE",
+    "NIGHT_RADIANCE",
     "SOLAR_IRRADIANCE",
     "Adapter",
     "AdapterError",
@@ -61,6 +70,7 @@ __all__ = [
     "HighClouds",
     "Keyframes",
     "Light",
+    "Moon",
     "NubisError",
     "ParameterError",
     "Params",

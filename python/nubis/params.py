@@ -40,6 +40,38 @@ class Sun(SunBlock):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Moon(Block):
+    """The moon. It lights air, clouds and ground as the sun does, casts shadows, and shines
+    together with it. Its bright side is toward the sun.
+
+    Attributes
+    ----------
+    elevation : float
+        Height above the horizon; at -90, the default, there is none. Allowed: a number from -90 to
+        90 degrees.
+    azimuth : float
+        Compass direction, clockwise from north. Allowed: a number from -360 to 360 degrees.
+    phase : float
+        Age as a share of a month: 0 is new, 0.25 half, 0.5 full, 0.75 half again and 1 new. A half
+        moon has a tenth of the light of a full one (Krisciunas and Schaefer 1991). Allowed: a
+        number from 0 to 1.
+    irradiance : tuple[float, float, float]
+        Irradiance of the full moon on a plane that faces it, above the air, in the unit of
+        `sun.irradiance`. The default is as much less than a sun of 10 as the magnitude of -12.73 is
+        than -26.74, and as much redder as B - V = 0.92 is than 0.65 (Allen's Astrophysical
+        Quantities). Allowed: 3 numbers from 0 to 1000000.
+    visible : bool
+        Whether the moon's disc is drawn. Allowed: True or False.
+    """
+
+    elevation: float = -90.0
+    azimuth: float = 180.0
+    phase: float = 0.5
+    irradiance: tuple[float, float, float] = (0.000027, 0.000025, 0.00002)
+    visible: bool = True
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Clouds(Block):
     """The volumetric clouds: where they are and what they are made of.
 
@@ -592,6 +624,9 @@ class Params(Root):
     ----------
     sun : Sun
         The sun.
+    moon : Moon
+        The moon. It lights air, clouds and ground as the sun does, casts shadows, and shines
+        together with it. Its bright side is toward the sun.
     clouds : Clouds
         The volumetric clouds: where they are and what they are made of.
     upper_clouds : UpperClouds
@@ -620,6 +655,7 @@ class Params(Root):
     """
 
     sun: Sun = field(default_factory=Sun)
+    moon: Moon = field(default_factory=Moon)
     clouds: Clouds = field(default_factory=Clouds)
     upper_clouds: UpperClouds = field(default_factory=UpperClouds)
     weather: Weather = field(default_factory=Weather)

@@ -1,4 +1,4 @@
-// The disc of the sun: the share of its light in each pixel, exact however wide pixels are. A point of the sky beside
+// The discs of sun and moon: the share of its light in each pixel, exact however wide pixels are. A point of the sky beside
 // its middle is a place in the plane that touches the sky there (a gnomonic projection, in which great circles are straight), in
 // radii of the disc. There a pixel is a polygon, and its share of a round disc follows from its edges alone (Green's theorem),
 // so that the shares of neighbours add up, whatever is rounded on the edge between them.
@@ -17,10 +17,19 @@ struct Disc {
     bounds: vec4f, // left, top, right and bottom of a part of the picture that holds it, pixels
     irradiance: vec3f,
     limb: vec3f,
+    bright: vec3f, // unit vector to its bright side
+    phase: f32, // cosine of the angle at it between its light and the eye: 1 is all lit
 }
 
 fn sun_disc() -> Disc {
-    return Disc(frame.sun_direction, SUN_RADIUS, frame.sun_bounds, params.sun.irradiance, LIMB);
+    return Disc(frame.sun_direction, SUN_RADIUS, frame.sun_bounds, params.sun.irradiance, LIMB, perpendicular(frame.sun_direction), 1.0);
+}
+
+// The moon's mean angular radius, 15.54 minutes of arc (as in moon.rs). A full one is as bright at its limb as in its middle.
+const MOON_RADIUS = 0.004520;
+
+fn moon_disc() -> Disc {
+    return Disc(frame.moon_direction, MOON_RADIUS, frame.moon_bounds, frame.moon_light, vec3f(0.0), frame.moon_bright, frame.moon_phase);
 }
 
 // Radiance that a pixel gets of the discs, on average, through the air.
@@ -29,6 +38,7 @@ fn discs_in_pixel(pixel: vec2u) -> vec3f {
     if params.sun.visible > 0u {
         light += disc_in_pixel(sun_disc(), vec2f(pixel));
     }
+    light += disc_in_pixel(moon_disc(), vec2f(pixel));
     // Beside a disc rounding may leave less than nothing.
     return max(light, vec3f(0.0)) / pixel_solid_angle(vec2f(pixel));
 }
@@ -64,7 +74,11 @@ fn disc_in_part(disc: Disc, plane: DiscPlane, low: vec2f, high: vec2f) -> vec3f 
             let to_corner = select(from_corner + size, high, vec2f(x, y) + 1.0 == pieces);
             let region = clipped(pixel_polygon(plane, from_corner, to_corner), vec2f(0.0, 1.0), plane.horizon);
             let through = disc_transmittance(view_direction(0.5 * (from_corner + to_corner)).xyz);
-            share += through * polygon_share(region, 1.0 + 0.5 * disc.limb);
+            if disc.phase < 1.0 {
+                share += through * lit_share(region, plane.bright, disc.phase);
+            } else {
+                share += through * polygon_share(region, 1.0 + 0.5 * disc.limb);
+            }
         }
     }
     return share;
@@ -88,6 +102,7 @@ struct DiscPlane {
     right: vec3f,
     up: vec3f, // away from the ground
     radius: f32,
+    bright: vec2f, // unit vector to the bright side
     horizon: f32, // where the ground begins, radii up
 }
 
@@ -100,7 +115,8 @@ fn disc_plane(disc: Disc) -> DiscPlane {
     let toward = to_local(disc.direction);
     let middle = select(toward, toward / max(toward.z, 1e-6), CAMERA != EQUIRECT && CAMERA != FISHEYE);
     let horizon = -(sine + sin(frame.horizon_dip)) / max(cosine, 1e-6) / disc.radius;
-    return DiscPlane(middle, toward, to_local(right), to_local(up), disc.radius, horizon);
+    let bright = vec2f(dot(disc.bright, right), dot(disc.bright, up));
+    return DiscPlane(middle, toward, to_local(right), to_local(up), disc.radius, bright, horizon);
 }
 
 fn to_local(direction: vec3f) -> vec3f {
@@ -178,6 +194,20 @@ fn polygon_share(polygon: Polygon, exponent: vec3f) -> vec3f {
         sum += edge_share(polygon.corners[i], polygon.corners[(i + 1u) % polygon.count], exponent, beside);
     }
     return sum / (2.0 * PI);
+}
+
+// The same of what is lit of a ball, on average as bright everywhere: the half of its disc toward the light, and beyond that, or
+// less, half an ellipse, which is a disc that is squeezed.
+fn lit_share(region: Polygon, bright: vec2f, phase: f32) -> f32 {
+    let half_disc = polygon_share(clipped(region, bright, 0.0), vec3f(1.0)).x;
+    var squeezed = clipped(region, select(bright, -bright, phase > 0.0), 0.0);
+    let narrow = max(abs(phase), 1e-3);
+    for (var i = 0u; i < squeezed.count; i++) {
+        let at = squeezed.corners[i];
+        squeezed.corners[i] = at + bright * (dot(at, bright) * (1.0 / narrow - 1.0));
+    }
+    let ellipse = phase * polygon_share(squeezed, vec3f(1.0)).x;
+    return (half_disc + ellipse) / max(0.5 * (1.0 + phase), 1e-4);
 }
 
 // Places and weights of Gauss and Legendre's rule with four points, from -1 to 1.

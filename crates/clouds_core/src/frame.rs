@@ -7,6 +7,7 @@ use std::f64::consts::{FRAC_PI_2, PI as PI64};
 use glam::{DVec2, DVec3, Vec3};
 
 use crate::camera::{Camera, Projection};
+use crate::moon::MOON_RADIUS;
 use crate::params;
 use crate::params::{Edge, Model, Params, Phase};
 use crate::passes::{broad_weather, refine, shadow, sun_volume};
@@ -224,6 +225,16 @@ params! {
         /// Left, top, right and bottom of a part of the picture that holds the sun's disc, pixels; of a panorama maybe beyond its
         /// sides. Nothing where it is not in the picture.
         sun_bounds: [f32; 4] = [0.0; 4];
+        /// The same of the moon's.
+        moon_bounds: [f32; 4] = [0.0; 4];
+        /// Unit vector toward the moon.
+        moon_direction: [f32; 3] = [0.0, 0.0, 1.0];
+        /// Its irradiance.
+        moon_light: [f32; 3] = [0.0; 3];
+        /// Unit vector at right angles to that toward the moon, to the side of it that the sun lights.
+        moon_bright: [f32; 3] = [1.0, 0.0, 0.0];
+        /// Cosine of the angle at the moon between sun and eye: 1 when it is full.
+        moon_phase: f32 = 1.0;
         /// In how many directions, across and down, each pixel looks at the sky (passes/composite).
         sky_samples: u32 = 1;
         /// The same of the phase function (light.wgsl).
@@ -303,7 +314,12 @@ fn phase_width(params: &Params) -> f32 {
 
 /// The unit vector toward the sun.
 pub fn sun_direction(params: &Params) -> DVec3 {
-    let (elevation, azimuth) = (f64::from(params.sun.elevation), f64::from(params.sun.azimuth));
+    direction_to(params.sun.elevation, params.sun.azimuth)
+}
+
+/// The unit vector toward a height over the horizon and a compass direction, degrees.
+pub(crate) fn direction_to(elevation: f32, azimuth: f32) -> DVec3 {
+    let (elevation, azimuth) = (f64::from(elevation), f64::from(azimuth));
     let level = compass(azimuth) * elevation.to_radians().cos();
     DVec3::new(level.x, level.y, elevation.to_radians().sin())
 }
@@ -388,6 +404,7 @@ impl Frame {
         frame.droplet = droplet(f64::from(params.light.droplet_diameter)).map(|v| v as f32);
         frame.set_sky_scale(params);
         frame.sun_bounds = frame.disc_bounds(camera, sun_direction(params), SUN_RADIUS);
+        frame.set_moon(camera, params);
         frame.set_samples(params);
         frame
     }
@@ -458,11 +475,33 @@ impl Frame {
         [left, top, right, bottom]
     }
 
+    /// What is seen of the moon.
+    fn set_moon(&mut self, camera: &Camera, params: &Params) {
+        if !params.moon.visible || !params.moon.exists() {
+            return;
+        }
+        let toward = params.moon.direction();
+        let sun = params.lights_moon.map_or_else(|| sun_direction(params), DVec3::from_array);
+        let beside = sun - sun.dot(toward) * toward;
+        let bright = if beside.length() > 1e-9 { beside.normalize() } else { toward.any_orthonormal_vector() };
+        self.moon_bounds = self.disc_bounds(camera, toward, MOON_RADIUS);
+        self.moon_direction = toward.as_vec3().to_array();
+        self.moon_light = params.moon.light();
+        self.moon_bright = bright.as_vec3().to_array();
+        self.moon_phase = params.moon.phase_angle().cos() as f32;
+    }
+
+    /// Height over the level at the eye, degrees.
+    pub(crate) fn height_of(&self, direction: DVec3) -> f64 {
+        Vec3::from_array(self.zenith).as_dvec3().dot(direction).clamp(-1.0, 1.0).asin().to_degrees()
+    }
+
     /// The pixels of the sheet that discs of light are drawn in: first column, first row, columns, rows.
     pub(crate) fn disc_pixels(&self, params: &Params) -> Vec<[u32; 4]> {
         let mut found = Vec::new();
         let shown = params.sun.visible && params.sun.irradiance != [0.0; 3];
-        for [left, top, right, bottom] in [self.sun_bounds].into_iter().filter(|_| shown) {
+        let sun = Some(self.sun_bounds).filter(|_| shown);
+        for [left, top, right, bottom] in sun.into_iter().chain([self.moon_bounds]) {
             let first_row = (top.floor() as u32).max(self.sheet_row);
             let end_row = (bottom.ceil() as u32).min(self.sheet_row + self.rows);
             if !(left < right && top < bottom) || first_row >= end_row {

@@ -98,6 +98,24 @@ params! {
         visible: bool = true;
     }
 
+    /// The moon. It lights air, clouds and ground as the sun does, casts shadows, and shines together with it. Its bright side is
+    /// toward the sun.
+    Moon {
+        /// Height above the horizon; at -90, the default, there is none.
+        elevation: f32 = -90.0, in -90..=90 "degrees";
+        /// Compass direction, clockwise from north.
+        azimuth: f32 = 180.0, in -360..=360 "degrees";
+        /// Age as a share of a month: 0 is new, 0.25 half, 0.5 full, 0.75 half again and 1 new. A half moon has a tenth of the
+        /// light of a full one (Krisciunas and Schaefer 1991).
+        phase: f32 = 0.5, in 0..=1 "";
+        /// Irradiance of the full moon on a plane that faces it, above the air, in the unit of `sun.irradiance`. The default is
+        /// as much less than a sun of 10 as the magnitude of -12.73 is than -26.74, and as much redder as B - V = 0.92 is than 0.65
+        /// (Allen's Astrophysical Quantities).
+        irradiance: [f32; 3] = [2.7e-5, 2.5e-5, 2.0e-5], in 0..=1000000 "";
+        /// Whether the moon's disc is drawn.
+        visible: bool = true;
+    }
+
     /// The volumetric clouds: where they are and what they are made of.
     Clouds {
         /// How much of the sky is cloudy: shifts the weather map's coverage, 0 is clear, 0.5 the map as it is, 1 overcast.
@@ -405,6 +423,7 @@ params! {
 #[expect(missing_docs, reason = "each block says what it is")]
 pub struct Params {
     pub sun: Sun,
+    pub moon: Moon,
     pub clouds: Clouds,
     pub upper_clouds: UpperClouds,
     pub weather: Weather,
@@ -418,6 +437,8 @@ pub struct Params {
     pub weather_mix: Vec<(Weather, f32)>,
     /// A cloud of the user's own in place of the procedural ones.
     pub volume: Option<Arc<DensityGrid>>,
+    /// Unit vector toward the sun, where `sun` holds the moon's light (moon.rs).
+    pub(crate) lights_moon: Option<[f64; 3]>,
 }
 
 /// A larger weather map.
@@ -449,9 +470,10 @@ impl BroadShares {
 
 impl Params {
     /// The blocks with their names.
-    pub fn blocks(&self) -> [(&'static str, &dyn Block); 9] {
+    pub fn blocks(&self) -> [(&'static str, &dyn Block); 10] {
         [
             ("sun", &self.sun),
+            ("moon", &self.moon),
             ("clouds", &self.clouds),
             ("upper_clouds", &self.upper_clouds),
             ("weather", &self.weather),
@@ -464,9 +486,10 @@ impl Params {
     }
 
     /// The same, to set them.
-    pub fn blocks_mut(&mut self) -> [(&'static str, &mut dyn Block); 9] {
+    pub fn blocks_mut(&mut self) -> [(&'static str, &mut dyn Block); 10] {
         [
             ("sun", &mut self.sun),
+            ("moon", &mut self.moon),
             ("clouds", &mut self.clouds),
             ("upper_clouds", &mut self.upper_clouds),
             ("weather", &mut self.weather),
@@ -764,6 +787,7 @@ fn check_block(name: &str, block: &dyn Block) -> Result<()> {
 pub fn block(type_name: &str) -> Option<Box<dyn Block>> {
     let Params {
         sun,
+        moon,
         clouds,
         upper_clouds,
         weather,
@@ -774,10 +798,12 @@ pub fn block(type_name: &str) -> Option<Box<dyn Block>> {
         atmosphere,
         weather_mix: _,
         volume: _,
+        lights_moon: _,
     } = Params::default();
     let quality = Quality::default();
-    let blocks: [Box<dyn Block>; 10] = [
+    let blocks: [Box<dyn Block>; 11] = [
         Box::new(sun),
+        Box::new(moon),
         Box::new(clouds),
         Box::new(upper_clouds),
         Box::new(weather),

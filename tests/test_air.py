@@ -435,16 +435,20 @@ def test_ground_without_air_lights_clouds(renderer, model):
     grid = DensityGrid(
         np.full((4, 4, 4), 5e-3, np.float32), ((-300.0, -300.0, 900.0), (300.0, 300.0, 1500.0))
     )
-    params = clear(**{"atmosphere.enabled": False, "light.model": model, "light.ambient_occlusion": 0.0})
+    params = clear(
+        **{"atmosphere.enabled": False, "light.model": model, "light.ambient_occlusion": 0.0}
+    )
     params = params.replace(volume=grid)
     camera = looking((0.0, 0.0, 1.0), 10.0, 20.0)
     method = nubis.quality("draft").replace(contrast=0.0, path_samples=512)
     dark, bright = (
-        renderer(4, 3, method).render(
+        renderer(4, 3, method)
+        .render(
             camera,
             params.with_(**{"atmosphere.ground_albedo": (a, a, a)}),
             background=None,
-        )[..., :3].mean()
+        )[..., :3]
+        .mean()
         for a in (0.0, 1.0)
     )
     # A cloud without absorption sends back most of it.

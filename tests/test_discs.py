@@ -87,7 +87,9 @@ def test_flux_of_the_disc_in_panoramas(renderer, width, elevation):
 def test_flux_across_the_seam_of_a_panorama(renderer, azimuth):
     params = clear(**{"sun.azimuth": azimuth, "atmosphere.enabled": False})
     for width in (2, 64, 720):
-        flux, _ = disc_flux(renderer(width, max(width // 2, 1), "draft"), nubis.Camera.equirect(EYE), params)
+        flux, _ = disc_flux(
+            renderer(width, max(width // 2, 1), "draft"), nubis.Camera.equirect(EYE), params
+        )
         np.testing.assert_allclose(flux, params.sun.irradiance, rtol=0.003)
 
 
@@ -116,7 +118,9 @@ def test_flux_of_the_disc_in_fisheyes(renderer, fov, size):
     camera = nubis.Camera.fisheye((0.0, 0.0, 2e6), (0, 0, 1), fov)
     pixel = fov / size
     for elevation in (90.0, 70.0, 90 - fov / 2 + 0.3 + 1.5 * pixel):
-        params = clear(**{"sun.elevation": elevation, "sun.azimuth": 33.0, "atmosphere.enabled": False})
+        params = clear(
+            **{"sun.elevation": elevation, "sun.azimuth": 33.0, "atmosphere.enabled": False}
+        )
         flux, _ = disc_flux(make, camera, params)
         np.testing.assert_allclose(flux, params.sun.irradiance, rtol=0.005)
 
@@ -182,9 +186,7 @@ def test_a_telephoto_disc_is_smooth(renderer):
 @pytest.mark.parametrize("elevation", [40.0, 8.0, 0.5])
 def test_glow_around_the_sun_in_coarse_panoramas(renderer, elevation):
     """The mean of a fine panorama over each pixel near the sun: to 1.5 %."""
-    params = clear(
-        **{"sun.elevation": elevation, "sun.visible": False, "atmosphere.haze": 10.0}
-    )
+    params = clear(**{"sun.elevation": elevation, "sun.visible": False, "atmosphere.haze": 10.0})
     camera = nubis.Camera.equirect((0.0, 0.0, 300.0))
     fine = renderer(1024, 512, "draft").render(camera, params)[..., :3].astype(np.float64)
     weight = solid_angles(camera, 1024, 512)[:, :, None]
@@ -236,7 +238,9 @@ def test_peaks_of_phase_functions_in_wide_pixels(renderer, peak, model):
     fine = fine[..., :3].astype(np.float64)
     weight = solid_angles(camera, size[0] * n, size[1] * n)[..., None]
     blocks = size[1], n, size[0], n, -1
-    mean = (fine * weight).reshape(blocks).sum(axis=(1, 3)) / weight.reshape(blocks).sum(axis=(1, 3))
+    mean = (fine * weight).reshape(blocks).sum(axis=(1, 3)) / weight.reshape(blocks).sum(
+        axis=(1, 3)
+    )
     coarse = renderer(*size, few).render(camera, params, background=None)[..., :3]
     np.testing.assert_allclose(coarse, mean, rtol=0.02)
 

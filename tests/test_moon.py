@@ -125,7 +125,9 @@ def test_flux_of_the_moons_disc(renderer, phase, width):
     vacuum = {"atmosphere.enabled": False, "moon.phase": phase, **CLEAR}
     make = renderer(width, width // 2)
     for sun in -60.0, 30.0:
-        params = nubis.Params().with_(**vacuum, **up(), **{"sun.elevation": sun, "sun.azimuth": 10.0})
+        params = nubis.Params().with_(
+            **vacuum, **up(), **{"sun.elevation": sun, "sun.azimuth": 10.0}
+        )
         flux, _ = moon_flux(make, nubis.Camera.equirect(EYE), params)
         np.testing.assert_allclose(flux, np.array(params.moon.irradiance) * law(phase), rtol=0.005)
 

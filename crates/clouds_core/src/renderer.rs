@@ -288,7 +288,7 @@ impl Renderer {
         interrupt: Interrupt<'_>,
     ) -> Result<Picture> {
         let Lights { sun, moon } = self.lights(camera, params, time)?;
-        let mut still = |lit: &mut Self, sky: &Params, scene: Option<SceneDepth<'_>>| {
+        let still = |lit: &mut Self, sky: &Params, scene: Option<SceneDepth<'_>>| {
             lit.still(camera, sky, time, background, all, 0, scene, interrupt)
         };
         let Some(moon) = moon else { return still(self, sun.as_ref().unwrap_or(params), scene_depth) };

@@ -126,22 +126,24 @@ def test_skylight_on_the_ground():
     assert 0.05 < np.pi * table[0, :3] @ LUMINANCE < 0.15
 
 
+#: That beside which the night is as dark as it is.
+SUN = {"sun.irradiance": (10.0, 10.0, 10.0)}
+
+
 def test_night_falls(renderer):
     """Astronomical dusk ends at -18 degrees; what is left is the night's own light (Patat 2003)."""
     zenith = (0.0, 0.0, 1.0)
     light = [
-        sky(renderer, clear(**{"sun.elevation": e}), zenith) @ LUMINANCE
+        sky(renderer, clear(**{"sun.elevation": e, **SUN}), zenith) @ LUMINANCE
         for e in (0.0, -6.0, -12.0, -18.0, -30.0, -90.0)
     ]
     assert all(after < before * 1.001 for before, after in pairwise(light))
     assert light[0] / light[1] > 20 and light[1] / light[2] > 50
-    assert 1.5e-9 < light[-1] < 2.5e-9
+    assert 1.5e-8 < light[-1] < 2.5e-8
     # At -18 degrees what is left of the sun's is of the night's order.
     assert light[3] < 10 * light[-1]
     bright = clear(**{"sun.elevation": -90.0, "sun.irradiance": (1e6,) * 3})
-    np.testing.assert_allclose(
-        sky(renderer, bright, zenith) @ LUMINANCE, 1e6 * light[-1], rtol=1e-3
-    )
+    np.testing.assert_allclose(sky(renderer, bright, zenith) @ LUMINANCE, light[-1], rtol=1e-3)
 
 
 def test_tables_are_made_when_their_inputs_change():
@@ -391,3 +393,141 @@ def test_light_through_a_deck(depth):
     clouds = nubis.Params().clouds
     extinction = depth / (0.12 * (clouds.top - clouds.base))
     assert share(0.0, {"clouds.extinction": extinction})[0] == pytest.approx(through, rel=0.25)
+
+
+@pytest.mark.parametrize("elevation", [90.0, 40.0, 5.0, -10.0])
+def test_ground_without_air(renderer, elevation):
+    """Albedo / pi E sin(elevation), as the surface of Lambert that it is."""
+    params = clear(
+        **{
+            "sun.elevation": elevation,
+            "sun.irradiance": (10.0, 9.0, 8.0),
+            "atmosphere.enabled": False,
+            "atmosphere.ground_albedo": (0.1, 0.5, 0.9),
+        }
+    )
+    seen = renderer(8, 6).render(looking((0.3, 0.0, -1.0), 800.0, 40.0), params)[..., :3]
+    mu = max(np.sin(np.radians(elevation)), 0.0)
+    expected = np.array([0.1, 0.5, 0.9]) * (10.0, 9.0, 8.0) / np.pi * mu
+    np.testing.assert_allclose(seen, np.broadcast_to(expected, seen.shape), rtol=3e-3, atol=1e-9)
+
+
+def test_clouds_shade_the_ground_without_air(renderer):
+    """By their transmittance toward the sun, but for what they pass on."""
+    grid = DensityGrid(
+        np.full((2, 2, 2), 5e-3, np.float32), ((-9e4, -9e4, 1000.0), (9e4, 9e4, 1400.0))
+    )
+    params = clear(**{"atmosphere.enabled": False, "sun.elevation": 50.0}).replace(volume=grid)
+    camera = looking((0.0, 0.2, -1.0), 300.0, 20.0)
+    lit, shaded = (
+        renderer(8, 6).render(camera, sky)[..., :3] for sky in (params.replace(volume=None), params)
+    )
+    through = np.exp(-5e-3 * 400.0 / np.sin(np.radians(50.0)))
+    share = shaded / lit
+    np.testing.assert_allclose(share, through + (1 - through) * 0.25, atol=0.02)
+
+
+@pytest.mark.parametrize("model", ["octaves", "path"])
+def test_ground_without_air_lights_clouds(renderer, model):
+    """By the ground's radiance, whatever the air: all that a cloud has which the sun's light does
+    not reach through itself grows with the ground's albedo.
+    """
+    grid = DensityGrid(
+        np.full((4, 4, 4), 5e-3, np.float32), ((-300.0, -300.0, 900.0), (300.0, 300.0, 1500.0))
+    )
+    params = clear(
+        **{"atmosphere.enabled": False, "light.model": model, "light.ambient_occlusion": 0.0}
+    )
+    params = params.replace(volume=grid)
+    camera = looking((0.0, 0.0, 1.0), 10.0, 20.0)
+    method = nubis.quality("draft").replace(contrast=0.0, path_samples=512)
+    dark, bright = (
+        renderer(4, 3, method)
+        .render(
+            camera,
+            params.with_(**{"atmosphere.ground_albedo": (a, a, a)}),
+            background=None,
+        )[..., :3]
+        .mean()
+        for a in (0.0, 1.0)
+    )
+    # A cloud without absorption sends back most of it.
+    ground = np.sin(np.radians(40.0)) / np.pi
+    assert 0.3 * ground < bright - dark < 1.0 * ground
+
+
+@pytest.mark.parametrize("background", ["sky", None])
+def test_night_does_not_come_from_the_sun(renderer, background):
+    """Stars and airglow are as bright whatever the sun is, in the sky and on clouds; with the sun
+    below the ground and with none above it.
+    """
+    camera = nubis.Camera.look_at((0, 0, 200.0), (0, 1000, 500.0), fov_y=60.0)
+    base = nubis.Params()
+    make = renderer(32, 24)
+    pictures = {
+        (elevation, e): make.render(
+            camera,
+            base.with_(**{"sun.elevation": elevation, "sun.irradiance": (e, e, e)}),
+            background=background,
+        )
+        for elevation, e in [(-60.0, 0.0), (-60.0, 10.0), (-60.0, 1e4), (40.0, 0.0), (-3.0, 0.0)]
+    }
+    night = pictures[-60.0, 0.0]
+    assert night[..., :3].mean() > 1e-9
+    for key, picture in pictures.items():
+        np.testing.assert_allclose(picture, night, rtol=0.01, atol=2e-11, err_msg=str(key))
+
+
+def test_night_is_its_parameter_above_the_air(renderer):
+    """Straight up, through the air; and it is a radiance of its own, in proportion."""
+    up = np.array([0.0, 0.0, 1.0])
+    night = (4e-8, 2e-8, 1e-8)
+    dark = clear(**{"sun.irradiance": (0.0,) * 3, "atmosphere.night": night})
+    seen = sky(renderer, dark, up)
+    through = probe(
+        "vec4f(air_transmittance(x.x, x.y), 1.0)", np.array([[2.0, 1.0]]), imports=["atmosphere"]
+    )[0, :3]
+    np.testing.assert_allclose(seen, through * night, rtol=0.01)
+    double = sky(renderer, dark.with_(**{"atmosphere.night": tuple(2 * v for v in night)}), up)
+    np.testing.assert_allclose(double, 2 * seen, rtol=1e-3)
+
+
+HAZES = [0.0, 1.0, 10.0, 20.0, 50.0, 94.0, 100.0]
+
+
+def test_optical_depth_of_haze():
+    """0.00533 for each unit of haze straight up: what the manual says a clear day is."""
+    depth = []
+    for haze in HAZES:
+        through = probe(
+            "vec4f(air_transmittance(x.x, x.y), 1.0)",
+            np.array([[0.0, 1.0]]),
+            params=clear(**{"atmosphere.haze": haze}),
+            imports=["atmosphere"],
+        )[0, :3]
+        depth.append(-np.log(through.astype(np.float64)))
+    added = np.array(depth) - depth[0]
+    # Extinction at the ground times the scale height (Hillaire 2020).
+    expected = np.array(HAZES) * 4.440e-6 * 1200.0
+    np.testing.assert_allclose(added, expected[:, None] + np.zeros(3), rtol=0.01, atol=2e-4)
+    assert expected[HAZES.index(94.0)] == pytest.approx(0.5, abs=0.002)
+
+
+@pytest.mark.parametrize("elevation", [60.0, 3.0, -4.0])
+def test_every_haze_renders(renderer, elevation):
+    """To the end of the range: no hole, and ever less of a dark ground is told from the sky."""
+    camera = looking((0.0, 1.0, 0.0), 300.0, 40.0)
+    contrast = []
+    for haze in HAZES:
+        params = nubis.Params().with_(
+            **{"atmosphere.haze": haze, "sun.elevation": elevation, "sun.azimuth": 90.0}
+        )
+        picture = renderer(32, 24).render(camera, params)
+        assert np.isfinite(picture).all() and picture.min() >= 0
+        clear_sky = renderer(8, 64).render(
+            camera, params.with_(**CLEAR, **{"atmosphere.ground_albedo": (0.0,) * 3})
+        )
+        above, below = clear_sky[31, :, 1].mean(), clear_sky[33, :, 1].mean()
+        contrast.append(abs(above - below) / max(above, below))
+        assert clear_sky[..., :3].mean() > 0
+    assert all(after < before + 0.01 for before, after in pairwise(contrast))

@@ -93,7 +93,8 @@ def test_radiance_follows_the_sun(renderer, model):
     ]
     assert np.isfinite(one).all() and (one >= 0).all() and one.max() > 0
     np.testing.assert_allclose(two, 2 * one, rtol=1e-3, atol=1e-6)
-    dark = make.render(camera, params.with_(**{"sun.irradiance": (0.0, 0.0, 0.0)}))
+    nothing = {"sun.irradiance": (0.0, 0.0, 0.0), "atmosphere.night": (0.0, 0.0, 0.0)}
+    dark = make.render(camera, params.with_(**nothing))
     assert (dark[..., :3] == 0).all()
 
 

@@ -32,7 +32,13 @@ from nubis._renderer import Adapter, Renderer, adapters, quality
 from nubis._scene_depth import distance_from_z
 from nubis._scenes import scenes
 from nubis._shadow import ShadowMap, SunVisibility
-from nubis._units import LUMINOUS_EFFICACY, SOLAR_IRRADIANCE, luminance
+from nubis._units import (
+    LUMINOUS_EFFICACY,
+    LUNAR_IRRADIANCE,
+    NIGHT_RADIANCE,
+    SOLAR_IRRADIANCE,
+    luminance,
+)
 from nubis._weather import WeatherBlend, WeatherChange
 from nubis.params import (
     Atmosphere,
@@ -40,6 +46,7 @@ from nubis.params import (
     Drift,
     HighClouds,
     Light,
+    Moon,
     Params,
     Quality,
     Sun,
@@ -60,6 +67,8 @@ __version__ = "0.1.0"
 
 __all__ = [
     "LUMINOUS_EFFICACY",
+    "LUNAR_IRRADIANCE",
+    "NIGHT_RADIANCE",
     "SOLAR_IRRADIANCE",
     "Adapter",
     "AdapterError",
@@ -74,6 +83,7 @@ __all__ = [
     "HighClouds",
     "Keyframes",
     "Light",
+    "Moon",
     "NubisError",
     "ParameterError",
     "Params",

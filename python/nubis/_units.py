@@ -21,6 +21,16 @@ LUMINOUS_EFFICACY = 202.93
 #: times the efficacy 133 000 lx.
 SOLAR_IRRADIANCE = (719.6, 640.9, 617.8)
 
+#: Radiance of the night's own light above the air, airglow and stars, beside a sun of
+#: `SOLAR_IRRADIANCE`, in W/(m2 sr) of visible light: a value for ``atmosphere.night``. 20.9, 21.6
+#: and 22.6 magnitudes a square arcsecond in R, V and B (Patat 2003) against -27.1, -26.74, -26.09.
+NIGHT_RADIANCE = (1.94e-6, 1.28e-6, 8.6e-7)
+
+#: Irradiance of the full moon beside that sun, in W/m2 of visible light: a value for
+#: ``moon.irradiance``. V = -12.73 against -26.74 and B - V = 0.92 against 0.65 (Allen's
+#: Astrophysical Quantities).
+LUNAR_IRRADIANCE = (1.94e-3, 1.60e-3, 1.23e-3)
+
 
 def luminance(frame: npt.ArrayLike) -> npt.NDArray[np.float32]:
     """Return the luminance of a picture in cd/m2, where its sun has `SOLAR_IRRADIANCE`.

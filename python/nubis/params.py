@@ -40,6 +40,38 @@ class Sun(SunBlock):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Moon(Block):
+    """The moon. It lights air, clouds and ground as the sun does, casts shadows, and shines
+    together with it. Its bright side is toward the sun.
+
+    Attributes
+    ----------
+    elevation : float
+        Height above the horizon; at -90, the default, there is none. Allowed: a number from -90 to
+        90 degrees.
+    azimuth : float
+        Compass direction, clockwise from north. Allowed: a number from -360 to 360 degrees.
+    phase : float
+        Age as a share of a month: 0 is new, 0.25 half, 0.5 full, 0.75 half again and 1 new. A half
+        moon has a tenth of the light of a full one (Krisciunas and Schaefer 1991). Allowed: a
+        number from 0 to 1.
+    irradiance : tuple[float, float, float]
+        Irradiance of the full moon on a plane that faces it, above the air, in the unit of
+        `sun.irradiance`. The default is as much less than a sun of 10 as the magnitude of -12.73 is
+        than -26.74, and as much redder as B - V = 0.92 is than 0.65 (Allen's Astrophysical
+        Quantities). Allowed: 3 numbers from 0 to 1000000.
+    visible : bool
+        Whether the moon's disc is drawn. Allowed: True or False.
+    """
+
+    elevation: float = -90.0
+    azimuth: float = 180.0
+    phase: float = 0.5
+    irradiance: tuple[float, float, float] = (0.000027, 0.000025, 0.00002)
+    visible: bool = True
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Clouds(Block):
     """The volumetric clouds: where they are and what they are made of.
 
@@ -502,13 +534,15 @@ class Atmosphere(Block):
     Attributes
     ----------
     enabled : bool
-        Whether there is air; without it the sky is black and sunlight arrives undimmed. Allowed:
-        True or False.
+        Whether there is air; without it the sky is black, day and night, and sunlight arrives
+        undimmed. Allowed: True or False.
     planet_radius : float
         Radius of the planet (Earth 6 371 000, thesis2018 400 000). Allowed: a number from 10000 to
         1000000000 m.
     haze : float
-        Haze: amount of aerosol, 1 is a clear day. Allowed: a number from 0 to 20.
+        Haze: amount of aerosol. Each unit is an optical depth of 0.0053 straight up from the
+        ground, at 550 nm as at all wavelengths: 1 is air as clear as over the Antarctic, 10 to 20 a
+        clear day (0.05 to 0.1), 94 thick haze (0.5). Allowed: a number from 0 to 100.
     aerial_perspective : float
         How much air stands between the eye and the clouds: 1 is physical, 0 none. Allowed: a number
         from 0 to 10.
@@ -518,6 +552,10 @@ class Atmosphere(Block):
         Whether clouds cast shadows on the air: crepuscular rays. Allowed: True or False.
     ground_albedo : tuple[float, float, float]
         Albedo of the ground. Allowed: 3 numbers from 0 to 1.
+    night : tuple[float, float, float]
+        Radiance of the night's own light above the air, airglow and stars, which is there by day
+        too: 20.9, 21.6 and 22.6 magnitudes a square arcsecond in R, V and B (Patat 2003) beside a
+        sun of 10 and of -27.1, -26.74 and -26.09. Allowed: 3 numbers from 0 to 1000000.
     """
 
     enabled: bool = True
@@ -527,6 +565,7 @@ class Atmosphere(Block):
     ground_shadows: bool = True
     beams: bool = True
     ground_albedo: tuple[float, float, float] = (0.1, 0.12, 0.07)
+    night: tuple[float, float, float] = (0.000000027, 0.00000002, 0.000000014)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -632,6 +671,9 @@ class Params(Root):
     ----------
     sun : Sun
         The sun.
+    moon : Moon
+        The moon. It lights air, clouds and ground as the sun does, casts shadows, and shines
+        together with it. Its bright side is toward the sun.
     clouds : Clouds
         The volumetric clouds: where they are and what they are made of.
     upper_clouds : UpperClouds
@@ -665,6 +707,7 @@ class Params(Root):
     """
 
     sun: Sun = field(default_factory=Sun)
+    moon: Moon = field(default_factory=Moon)
     clouds: Clouds = field(default_factory=Clouds)
     upper_clouds: UpperClouds = field(default_factory=UpperClouds)
     weather: Weather = field(default_factory=Weather)

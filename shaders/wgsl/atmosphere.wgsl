@@ -18,11 +18,10 @@ const MIE_G = 0.8;
 const OZONE = vec3f(1.881e-6, 1.881e-6, 0.085e-6);
 const OZONE_ALTITUDE = 25000.0;
 const OZONE_WIDTH = 15000.0;
+// The sun's angular radius, 0.2666 degrees (IAU: 695 700 km at 1 au).
+const SUN_RADIUS = 0.004654;
 // Altitude where the air ends, m (as in frame.rs).
 const AIR_TOP = 100000.0;
-// Radiance of the night's own light, airglow and stars, for a sun of irradiance 1 above the air: 20.9, 21.6 and 22.6
-// magnitudes a square arcsecond in R, V and B (Patat 2003) against the sun's -27.1, -26.74 and -26.09.
-const NIGHT = vec3f(2.7e-9, 2.0e-9, 1.4e-9);
 
 // Shares of Rayleigh, aerosol and ozone at an altitude, 1 where they are densest.
 fn air_parts(h: f32) -> vec3f {
@@ -114,13 +113,16 @@ const TABLE_ALTITUDES = 24u;
 // Light falls by a factor of two or more with every degree of dusk: its logarithm is what is interpolated, around that of
 // a value in the middle, as half floats are finer there.
 const TABLE_MIDDLE = 1e-4;
+// What stands for no light, and below which half floats may have put it: ten thousand suns of such light would outshine the night.
+const TABLE_NONE = 1e-13;
+const TABLE_DARK = -20.7;
 
 fn to_table(light: vec3f) -> vec3f {
-    return log(max(light, vec3f(1e-13)) / TABLE_MIDDLE);
+    return log(max(light, vec3f(TABLE_NONE)) / TABLE_MIDDLE);
 }
 
 fn from_table(texel: vec3f) -> vec3f {
-    return TABLE_MIDDLE * exp(texel);
+    return select(TABLE_MIDDLE * exp(texel), vec3f(0.0), texel < vec3f(TABLE_DARK));
 }
 
 // Where a table has an altitude and a cosine: with square roots, as air is densest at the ground and dusk at the horizon.
@@ -180,14 +182,26 @@ fn sky_from_below(h: f32, mu: f32) -> vec3f {
     return air_light_at(FROM_BELOW, h, mu);
 }
 
-// Radiance of the ground under sun and sky, for a sun of irradiance 1.
-fn ground_light(mu: f32) -> vec3f {
-    let sun = sunlight(0.0, mu) * max(mu, 0.0) / PI;
-    return params.atmosphere.ground_albedo * (sun + sky_from_above(0.0, mu));
+// Irradiance over pi on a level plane from above, but for the sun's own: that of the air and of the night.
+fn light_from_above(h: f32, mu: f32) -> vec3f {
+    if params.atmosphere.enabled == 0u {
+        return vec3f(0.0);
+    }
+    return params.sun.irradiance * sky_from_above(h, mu) + params.atmosphere.night;
 }
 
+// The same from below: that of the ground and of the air before it.
+fn light_from_below(h: f32, mu: f32) -> vec3f {
+    if params.atmosphere.enabled == 0u {
+        return ground_radiance(mu);
+    }
+    return params.sun.irradiance * sky_from_below(h, mu) + params.atmosphere.ground_albedo * params.atmosphere.night;
+}
+
+// Radiance of the ground under sun and sky.
 fn ground_radiance(mu: f32) -> vec3f {
-    return params.sun.irradiance * ground_light(mu);
+    let sun = params.sun.irradiance * sunlight(0.0, mu) * max(mu, 0.0) / PI;
+    return params.atmosphere.ground_albedo * (sun + light_from_above(0.0, mu));
 }
 
 // Coordinates of a direction in the sky map: azimuth from the sun across, angle from the horizon down, with square
@@ -216,10 +230,11 @@ fn sky_texel(at: vec2f, size: vec2f) -> vec2f {
     return vec2f(mix(half_texel.x, 1.0 - half_texel.x, at.x), v);
 }
 
-// What the sky map holds is the radiance for a sun of irradiance 1, times `frame.sky_scale`: at most 4 in front of the sun,
-// and 1e-9 at night, which would not fit into half floats (6e-8 to 65,504) together. The irradiance can be anything.
+// What the sky map holds is the radiance over `frame.sky_unit`, the sun's irradiance or what the night is as bright as, times
+// `frame.sky_scale`: at most 4 in front of the sun, and 1e-9 at night, which would not fit into half floats (6e-8 to 65,504)
+// together. The irradiance can be anything.
 // Radiance of the air in a direction, without clouds, sun and ground.
 fn sky_radiance(direction: vec3f) -> vec3f {
     let uv = sky_texel(sky_coordinates(direction), vec2f(textureDimensions(sky_map)));
-    return textureSampleLevel(sky_map, clamp_sampler, uv, 0.0).rgb * (params.sun.irradiance / frame.sky_scale);
+    return textureSampleLevel(sky_map, clamp_sampler, uv, 0.0).rgb * (frame.sky_unit / frame.sky_scale);
 }

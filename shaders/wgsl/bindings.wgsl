@@ -22,6 +22,7 @@ override BEAMS: bool = false; // clouds cast shadows on the air
 override SCENE: bool = false; // there is a scene of the user's among the clouds
 override SUBRAYS: bool = false; // pixels may be wider than clouds, see subrays.wgsl
 override SPARSE: bool = false; // the clouds are known at the corners of cells of pixels alone, see lattice.wgsl
+override WIDE_PHASE: bool = false; // the phase function varies within a pixel
 override LIGHT_DETAIL: bool = true; // there are light samples that see the detail
 override LIGHT_CHEAP: bool = true; // there are light samples that do not
 
@@ -114,6 +115,7 @@ struct CellPast {
     approach: f32, // m that this has come nearer
     glare: f32, // relative change of the light that is scattered toward the eye
     source: u32, // what the prediction rests on
+    width: f32, // between known pixels at distance 1
 }
 
 // A ray on its way to convergence (passes/reference).

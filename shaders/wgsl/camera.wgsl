@@ -6,8 +6,9 @@ const PERSPECTIVE = 0u;
 const EQUIRECT = 1u; // centre north, right clockwise from above
 const FISHEYE = 2u; // equidistant: the angle to the axis grows linearly from the centre
 
-// A unit direction, or nothing (w = 0) outside the circle of a fisheye. `pixel` has its centres at half-integers.
-fn view_direction(pixel: vec2f) -> vec4f {
+// A direction to the right, up and forward, or nothing (w = 0) outside the circle of a fisheye. Of a pinhole its last is 1,
+// which keeps the digits of narrow views; of the others it is one long. `pixel` has its centres at half-integers.
+fn local_direction(pixel: vec2f) -> vec4f {
     let size = vec2f(f32(frame.width), f32(frame.height));
     let ndc = vec2f(2.0, -2.0) * (pixel / size) + vec2f(-1.0, 1.0); // right and up
     var local: vec3f; // right, up, forward
@@ -29,8 +30,62 @@ fn view_direction(pixel: vec2f) -> vec4f {
             local = vec3f(ndc * vec2f(size.x / size.y, 1.0) * frame.tan_half_fov, 1.0);
         }
     }
+    return vec4f(local, valid);
+}
+
+// The same in the world, one long.
+fn view_direction(pixel: vec2f) -> vec4f {
+    let local = local_direction(pixel);
     let direction = local.x * frame.right + local.y * frame.up + local.z * frame.forward;
-    return vec4f(normalize(direction), valid);
+    return vec4f(normalize(direction), local.w);
+}
+
+// Solid angle that a place in the picture stands for, as a share of the most that any does.
+fn place_weight(pixel: vec2f) -> f32 {
+    let local = local_direction(pixel).xyz;
+    switch CAMERA {
+        case EQUIRECT: {
+            return length(local.xz);
+        }
+        case FISHEYE: {
+            let sine = length(local.xy);
+            return max(select(1.0, sine / atan2(sine, local.z), sine > 1e-3 || local.z < 0.0), 1e-6);
+        }
+        default: {
+            let l = length(local);
+            return 1.0 / (l * l * l);
+        }
+    }
+}
+
+// Solid angle of a pixel, given by its corner, sr.
+fn pixel_solid_angle(corner: vec2f) -> f32 {
+    let size = vec2f(f32(frame.width), f32(frame.height));
+    switch CAMERA {
+        case EQUIRECT: {
+            let high = PI / size.y;
+            let latitude = 0.5 * PI - (corner.y + 0.5) * high;
+            return 2.0 * PI / size.x * 2.0 * cos(latitude) * sin(0.5 * high);
+        }
+        case FISHEYE: {
+            let width = 2.0 * frame.half_fov / min(size.x, size.y);
+            return width * width * place_weight(corner + 0.5);
+        }
+        default: {
+            // Two triangles (Van Oosterom and Strackee 1983), whose determinant is their area at distance 1.
+            let a = local_direction(corner).xyz;
+            let b = local_direction(corner + vec2f(1.0, 0.0)).xyz;
+            let c = local_direction(corner + 1.0).xyz;
+            let d = local_direction(corner + vec2f(0.0, 1.0)).xyz;
+            let wide = 2.0 * frame.tan_half_fov / size.y;
+            return 2.0 * (atan2(wide * wide, triangle_denominator(a, b, c)) + atan2(wide * wide, triangle_denominator(a, c, d)));
+        }
+    }
+}
+
+fn triangle_denominator(a: vec3f, b: vec3f, c: vec3f) -> f32 {
+    let l = vec3f(length(a), length(b), length(c));
+    return l.x * l.y * l.z + dot(a, b) * l.z + dot(b, c) * l.x + dot(c, a) * l.y;
 }
 
 // The pixel that is marched for a cell of a subset. The last cells may hang over the edge; they march the edge, or, in a sparse
@@ -94,17 +149,19 @@ fn shortest_way(motion: vec2f) -> vec2f {
     return motion;
 }
 
-// Width of a pixel at distance 1, in the middle of the picture.
-fn pixel_width() -> f32 {
+// Width at distance 1 of the pixel that looks in a direction, along its wider side: what is narrower is lost along that. Away
+// from its axis a pinhole's pixels are narrower; near the poles a panorama's are as high as elsewhere.
+fn pixel_width(direction: vec3f) -> f32 {
     switch CAMERA {
         case EQUIRECT: {
-            return 2.0 * PI / f32(frame.width);
+            let level = sqrt(max(1.0 - dot(direction, frame.up) * dot(direction, frame.up), 0.0));
+            return PI * max(2.0 * level / f32(frame.width), 1.0 / f32(frame.height));
         }
         case FISHEYE: {
             return 2.0 * frame.half_fov / f32(min(frame.width, frame.height));
         }
         default: {
-            return 2.0 * frame.tan_half_fov / f32(frame.height);
+            return 2.0 * frame.tan_half_fov / f32(frame.height) * dot(direction, frame.forward);
         }
     }
 }

@@ -33,7 +33,7 @@ const EMBOSS_GAIN = 0.9;
 const EMBOSS_HALF = 0.15;
 
 // The high clouds where a ray crosses their sphere, or nothing.
-fn high_layer(direction: vec3f, distance: f32, visible: bool) -> Layer {
+fn high_layer(direction: vec3f, distance: f32, visible: bool, turned: Turn) -> Layer {
     // What is not seen reads the texture in one place, from the cache.
     let p = select(vec3f(0.0), distance * direction, visible);
     let cosine = cos_zenith_along(direction, distance, params.high_clouds.altitude);
@@ -46,7 +46,7 @@ fn high_layer(direction: vec3f, distance: f32, visible: bool) -> Layer {
 
     let mu_sun = cos_zenith_at(p, frame.sun_direction);
     let depth = depth_to_sun(along, optical_depth / max(abs(mu_sun), HIGH_GRAZING), select(-mu_sun, mu_sun, cosine > 0.0));
-    var sun = sun_scattering(depth, 0.0, one_minus_cos(direction, frame.sun_direction)) * high_sun(mu_sun);
+    var sun = seen_scattering(depth, 0.0, turned) * high_sun(mu_sun);
     if HIGH_EMBOSS {
         sun *= 1.0 + params.high_clouds.emboss * EMBOSS_GAIN * high.relief / (abs(high.relief) + EMBOSS_HALF);
     }

@@ -7,6 +7,7 @@
 #import sun_volume
 #import ambient
 #import aerial
+#import camera
 
 // Six directions spread over the unit sphere for the cone of light samples (nubis2015's noise kernel).
 const CONE = array<vec3f, 6>(
@@ -159,15 +160,44 @@ fn model_phase(one_minus_mu: f32) -> f32 {
     }
 }
 
+// How far sunlight turns toward the eye, and the phase function of that, the mean over a pixel.
+struct Turn {
+    one_minus_mu: f32,
+    phase: f32,
+}
+
+// Of the light that a pixel sees, given by its corner.
+fn seen_turn(direction: vec3f, corner: vec2f) -> Turn {
+    let one_minus_mu = one_minus_cos(direction, frame.sun_direction);
+    if !WIDE_PHASE {
+        return Turn(one_minus_mu, model_phase(one_minus_mu));
+    }
+    let n = frame.phase_samples;
+    var sum = 0.0;
+    var whole = 0.0;
+    for (var i = 0u; i < n * n; i++) {
+        let at = corner + (vec2f(vec2u(i % n, i / n)) + 0.5) / f32(n);
+        let weight = place_weight(at);
+        sum += weight * model_phase(one_minus_cos(view_direction(at).xyz, frame.sun_direction));
+        whole += weight;
+    }
+    return Turn(one_minus_mu, sum / whole);
+}
+
 // What a cloud sends toward the eye of sunlight that has crossed the optical depth `depth`: radiance for each unit of
 // irradiance and of the eye's own optical depth.
 fn sun_scattering(depth: f32, precipitation: f32, one_minus_mu: f32) -> f32 {
+    return seen_scattering(depth, precipitation, Turn(one_minus_mu, model_phase(one_minus_mu)));
+}
+
+// The same of what a pixel sees.
+fn seen_scattering(depth: f32, precipitation: f32, turned: Turn) -> f32 {
     if MODEL == MODEL_SINGLE {
-        return params.light.albedo * model_phase(one_minus_mu) * exp(-depth);
+        return params.light.albedo * turned.phase * exp(-depth);
     }
     // Paths are not traced through the high clouds, which have no thickness.
     if MODEL == MODEL_OCTAVES || MODEL == MODEL_PATH {
-        return params.light.albedo * octaves(depth, one_minus_mu);
+        return params.light.albedo * octaves(depth, turned);
     }
     // Artistic models see a thinner cloud, and a thicker one where it rains (nubis2015's p).
     let d = depth * params.light.absorption * mix(1.0, params.light.rain_absorption, precipitation);
@@ -176,24 +206,24 @@ fn sun_scattering(depth: f32, precipitation: f32, one_minus_mu: f32) -> f32 {
     if MODEL == MODEL_THESIS2018 {
         beer = max(beer, 0.7 * exp(-0.5 * d));
     }
-    return 2.0 * params.light.sun_gain * beer * powder * model_phase(one_minus_mu);
+    return 2.0 * params.light.sun_gain * beer * powder * turned.phase;
 }
 
 // Further orders as copies of the first with less light, less extinction and less anisotropy each (Wrenninge et al. 2013,
 // Hillaire 2016).
-fn octaves(depth: f32, one_minus_mu: f32) -> f32 {
+fn octaves(depth: f32, turned: Turn) -> f32 {
     var sum = 0.0;
     var share = 1.0;
     var d = depth;
     var peak = 1.0;
     for (var i = 0u; i < params.light.octaves; i++) {
-        var phase = 0.0;
-        if PHASE == PHASE_HENYEY_GREENSTEIN {
-            phase = henyey_greenstein(one_minus_mu, peak * params.light.g);
-        } else if PHASE == PHASE_MIE && i == 0u {
-            phase = droplet_phase(one_minus_mu);
-        } else {
-            phase = droplet_fit(one_minus_mu, peak);
+        var phase = turned.phase;
+        if i > 0u {
+            if PHASE == PHASE_HENYEY_GREENSTEIN {
+                phase = henyey_greenstein(turned.one_minus_mu, peak * params.light.g);
+            } else {
+                phase = droplet_fit(turned.one_minus_mu, peak);
+            }
         }
         sum += share * phase * exp(-d);
         share *= params.light.octave_scattering;
@@ -270,14 +300,14 @@ fn gathered_radiance(sum: Gathered, nodes: Nodes, direction: vec3f) -> vec3f {
         return sun;
     }
     let below = sum.weight.x - sum.above.x;
-    return sun + sum.above.x * ambient_above(vec3f(0.0)) + below * ambient_below(vec3f(0.0));
+    let ground = ground_share() * sky_light[1].rgb;
+    return sun + sum.above.x * ambient_above(vec3f(0.0)) + below * ambient_below(ground);
 }
 
 fn radiance_through_air(sum: Gathered, nodes: Nodes, direction: vec3f) -> vec3f {
     let way = air_way(direction);
     let texels = air_texels(direction);
     let sky = sky_radiance(direction);
-    let lit_ground = ground_share() * params.sun.irradiance;
     var radiance = vec3f(0.0);
     var depth = vec3f(0.0);
     var before = min(way.start, nodes.start);
@@ -291,8 +321,8 @@ fn radiance_through_air(sum: Gathered, nodes: Nodes, direction: vec3f) -> vec3f 
         let mu = cos_zenith_at(p, frame.sun_direction);
         var light = sum.sun[k] * sun_irradiance(h, mu);
         if MODEL != MODEL_SINGLE {
-            light += sum.above[k] * ambient_above(clouded_sky(params.sun.irradiance * sky_from_above(h, mu)));
-            light += (sum.weight[k] - sum.above[k]) * ambient_below(lit_ground * sky_from_below(h, mu));
+            light += sum.above[k] * ambient_above(clouded_sky(light_from_above(h, mu)));
+            light += (sum.weight[k] - sum.above[k]) * ambient_below(ground_share() * light_from_below(h, mu));
         }
         radiance += air.transmittance * light + sum.weight[k] * air.radiance;
     }

@@ -15,7 +15,7 @@ fn rays_through(view: vec3f) -> f32 {
     if !SUBRAYS {
         return 1.0;
     }
-    let width = cloud_stretches(view).start * pixel_width() * f32(spacing()) / (CLOUD_WIDTH * frame.leap_scale);
+    let width = cloud_stretches(view).start * pixel_width(view) * f32(spacing()) / (CLOUD_WIDTH * frame.leap_scale);
     return clamp(ceil(width * width), 1.0, MOST_RAYS);
 }
 

@@ -2,13 +2,14 @@
 //! its digits in f32 (planet radii, long times, distant eyes) is worked out here in f64.
 
 use std::f32::consts::PI;
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, PI as PI64};
 
 use glam::{DVec2, DVec3, Vec3};
 
 use crate::camera::{Camera, Projection};
+use crate::moon::MOON_RADIUS;
 use crate::params;
-use crate::params::{Edge, Params};
+use crate::params::{Edge, Model, Params, Phase};
 use crate::passes::{broad_weather, refine, shadow, sun_volume};
 use crate::wind::Carried;
 
@@ -23,6 +24,10 @@ params! {
         first_row: u32 = 0;
         /// Rows of this band.
         rows: u32 = 1;
+        /// First column of the pixels of a disc of light (passes/composite).
+        first_column: u32 = 0;
+        /// How many columns they are.
+        columns: u32 = 1;
         /// First row that the buffers hold: where this sheet begins (of the marched rows, in `march`).
         sheet_row: u32 = 0;
         /// Rows that they hold.
@@ -172,6 +177,8 @@ params! {
 
         /// By what the sky map is multiplied (atmosphere.wgsl).
         sky_scale: f32 = 1024.0;
+        /// By what it is divided: irradiance.
+        sky_unit: [f32; 3] = [1.0; 3];
         /// Unit vector toward the sun.
         sun_direction: [f32; 3] = [0.0, 0.0, 1.0];
         /// The same of the frame before.
@@ -227,6 +234,24 @@ params! {
         /// The same for the small ones.
         high_update_small: [f32; 4] = [0.0; 4];
 
+        /// Left, top, right and bottom of a part of the picture that holds the sun's disc, pixels; of a panorama maybe beyond its
+        /// sides. Nothing where it is not in the picture.
+        sun_bounds: [f32; 4] = [0.0; 4];
+        /// The same of the moon's.
+        moon_bounds: [f32; 4] = [0.0; 4];
+        /// Unit vector toward the moon.
+        moon_direction: [f32; 3] = [0.0, 0.0, 1.0];
+        /// Its irradiance.
+        moon_light: [f32; 3] = [0.0; 3];
+        /// Unit vector at right angles to that toward the moon, to the side of it that the sun lights.
+        moon_bright: [f32; 3] = [1.0, 0.0, 0.0];
+        /// Cosine of the angle at the moon between sun and eye: 1 when it is full.
+        moon_phase: f32 = 1.0;
+        /// In how many directions, across and down, each pixel looks at the sky (passes/composite).
+        sky_samples: u32 = 1;
+        /// The same of the phase function (light.wgsl).
+        phase_samples: u32 = 1;
+
         /// 1 where there is a scene of the user's, for which kernels are compiled.
         scene: u32 = 0;
         /// 1 where its radiance is known.
@@ -264,6 +289,16 @@ const RAIN_STRETCH: f64 = 12.0;
 /// Altitude where the air ends, m (Hillaire 2020).
 const AIR_TOP: f64 = 100_000.0;
 
+/// The sun's angular radius (as in atmosphere.wgsl), radians.
+const SUN_RADIUS: f64 = 0.004_654;
+
+/// Widest pixel that sees the glow around the sun as it is in its middle, radians: a seventh of the half width of the forward
+/// peak of aerosol (g = 0.8), with which the mean differs by 0.5 % where it is brightest.
+const GLOW: f32 = 0.032;
+/// Most directions, across and down, for the sky and for the phase function.
+const MOST_SKY: f32 = 12.0;
+const MOST_PHASE: f32 = 64.0;
+
 /// The parameters of the phase function of droplets of 5 to 50 µm diameter (Jendersie and d'Eon 2023, equations 4 to 7).
 fn droplet(diameter: f64) -> [f64; 4] {
     [
@@ -274,9 +309,29 @@ fn droplet(diameter: f64) -> [f64; 4] {
     ]
 }
 
+/// The half width of the narrowest peak of the phase function of clouds, radians.
+fn phase_width(params: &Params) -> f32 {
+    let light = &params.light;
+    let peak = |g: f32| (1.0 - g.abs()) / g.abs().max(1e-3).sqrt();
+    match light.phase {
+        Phase::HenyeyGreenstein if matches!(light.model, Model::Thesis2018 | Model::Vsu2022) => {
+            peak(light.g).min(peak(light.g_back))
+        }
+        Phase::HenyeyGreenstein => peak(light.g),
+        Phase::Droplet => peak(droplet(f64::from(light.droplet_diameter))[0] as f32),
+        // Half a ring of the glory, or of the aureole: light of 0.55 µm on a disc as wide as the droplet.
+        Phase::Mie => 0.5 * 0.55 / light.droplet_diameter,
+    }
+}
+
 /// The unit vector toward the sun.
 pub fn sun_direction(params: &Params) -> DVec3 {
-    let (elevation, azimuth) = (f64::from(params.sun.elevation), f64::from(params.sun.azimuth));
+    direction_to(params.sun.elevation, params.sun.azimuth)
+}
+
+/// The unit vector toward a height over the horizon and a compass direction, degrees.
+pub(crate) fn direction_to(elevation: f32, azimuth: f32) -> DVec3 {
+    let (elevation, azimuth) = (f64::from(elevation), f64::from(azimuth));
     let level = compass(azimuth) * elevation.to_radians().cos();
     DVec3::new(level.x, level.y, elevation.to_radians().sin())
 }
@@ -374,18 +429,125 @@ impl Frame {
         frame.sun_direction = sun_direction(params).as_vec3().to_array();
         frame.set_high_sun(params);
         frame.droplet = droplet(f64::from(params.light.droplet_diameter)).map(|v| v as f32);
-        frame.set_sky_scale();
+        frame.set_sky_scale(params);
+        frame.sun_bounds = frame.disc_bounds(camera, sun_direction(params), SUN_RADIUS);
+        frame.set_moon(camera, params);
+        frame.set_samples(params);
         frame
     }
 
-    /// Angle between marched pixels in the middle of the picture, radians (`pixel_width` of camera.wgsl).
+    /// Angle between marched pixels in the middle of the picture, radians.
     pub fn marched_angle(&self) -> f32 {
-        let pixel = match self.camera_kind {
-            kind if kind == Projection::Equirect as u32 => 2.0 * PI / self.width as f32,
+        self.pixel_angle() * self.stride as f32
+    }
+
+    /// Width of a pixel there, radians (`pixel_width` of camera.wgsl).
+    fn pixel_angle(&self) -> f32 {
+        match self.camera_kind {
+            kind if kind == Projection::Equirect as u32 => (2.0 * PI / self.width as f32).max(PI / self.height as f32),
             kind if kind == Projection::Fisheye as u32 => 2.0 * self.half_fov / self.width.min(self.height) as f32,
             _ => 2.0 * self.tan_half_fov / self.height as f32,
+        }
+    }
+
+    /// Left, top, right and bottom of a part of the picture that holds a disc in a direction, of a radius in radians; empty where
+    /// it is not in the picture.
+    fn disc_bounds(&self, camera: &Camera, direction: DVec3, radius: f64) -> [f32; 4] {
+        let (width, height) = (f64::from(self.width), f64::from(self.height));
+        let [x, y, z] = [camera.right, camera.up, camera.forward].map(|axis| direction.dot(axis));
+        // With room for what f32 makes of it.
+        let radius = 1.02 * radius;
+        let (across, down) = match camera.projection {
+            Projection::Equirect => {
+                let latitude = y.clamp(-1.0, 1.0).asin();
+                // Around a pole it is everywhere.
+                let over = latitude.abs() + radius >= FRAC_PI_2;
+                let half = if over { PI64 } else { (radius.sin() / latitude.cos()).min(1.0).asin() };
+                let middle = x.atan2(z);
+                let pixels = |longitude: f64| (0.5 + 0.5 * longitude / PI64) * width;
+                let row = |latitude: f64| (0.5 - latitude.clamp(-FRAC_PI_2, FRAC_PI_2) / PI64) * height;
+                ([pixels(middle - half), pixels(middle + half)], [row(latitude + radius), row(latitude - radius)])
+            }
+            Projection::Fisheye => {
+                let sine = x.hypot(y);
+                let (angle, rim) = (sine.atan2(z), 0.5 * camera.fov.to_radians());
+                let outer = angle + radius;
+                let scale = 0.5 * width.min(height) / rim;
+                // Away from the axis what is round is wide, and opposite it everywhere.
+                let half =
+                    if outer < 3.1 { radius * scale * (outer / outer.sin()).max(1.0) } else { 2.0 * width.max(height) };
+                let seen = if angle - radius <= rim { half } else { f64::NEG_INFINITY };
+                let middle = DVec2::new(x, -y) / sine.max(1e-12) * angle * scale + 0.5 * DVec2::new(width, height);
+                ([middle.x - seen, middle.x + seen], [middle.y - seen, middle.y + seen])
+            }
+            Projection::Perspective => {
+                // The planes through the eye and an axis of the picture that touch the disc.
+                let along = |side: f64, half: f64, size: f64| {
+                    let reach = radius.sin() / side.hypot(z).max(1e-12);
+                    let turn = if reach < 1.0 { reach.asin() } else { FRAC_PI_2 };
+                    let place = |angle: f64| (0.5 + 0.5 * angle.clamp(-1.57, 1.57).tan() / half) * size;
+                    let angle = side.atan2(z);
+                    if angle.abs() - turn < FRAC_PI_2 { [place(angle - turn), place(angle + turn)] } else { [0.0, 0.0] }
+                };
+                let tan = f64::from(self.tan_half_fov);
+                (along(x, tan * width / height, width), along(-y, tan, height))
+            }
         };
-        pixel * self.stride as f32
+        let inside = |range: [f64; 2], size: f64| range.map(|v| v.clamp(0.0, size) as f32);
+        let [top, bottom] = inside(down, height);
+        let [left, right] = match camera.projection {
+            Projection::Equirect => across.map(|v| v as f32),
+            _ => inside(across, width),
+        };
+        [left, top, right, bottom]
+    }
+
+    /// What is seen of the moon.
+    fn set_moon(&mut self, camera: &Camera, params: &Params) {
+        if !params.moon.visible || !params.moon.exists() {
+            return;
+        }
+        let toward = params.moon.direction();
+        let sun = params.lights_moon.map_or_else(|| sun_direction(params), DVec3::from_array);
+        let beside = sun - sun.dot(toward) * toward;
+        let bright = if beside.length() > 1e-9 { beside.normalize() } else { toward.any_orthonormal_vector() };
+        self.moon_bounds = self.disc_bounds(camera, toward, MOON_RADIUS);
+        self.moon_direction = toward.as_vec3().to_array();
+        self.moon_light = params.moon.light();
+        self.moon_bright = bright.as_vec3().to_array();
+        self.moon_phase = params.moon.phase_angle().cos() as f32;
+    }
+
+    /// Height over the level at the eye, degrees.
+    pub(crate) fn height_of(&self, direction: DVec3) -> f64 {
+        Vec3::from_array(self.zenith).as_dvec3().dot(direction).clamp(-1.0, 1.0).asin().to_degrees()
+    }
+
+    /// The pixels of the sheet that discs of light are drawn in: first column, first row, columns, rows.
+    pub(crate) fn disc_pixels(&self, params: &Params) -> Vec<[u32; 4]> {
+        let mut found = Vec::new();
+        let shown = params.sun.visible && params.sun.irradiance != [0.0; 3];
+        let sun = Some(self.sun_bounds).filter(|_| shown);
+        for [left, top, right, bottom] in sun.into_iter().chain([self.moon_bounds]) {
+            let first_row = (top.floor() as u32).max(self.sheet_row);
+            let end_row = (bottom.ceil() as u32).min(self.sheet_row + self.rows);
+            if !(left < right && top < bottom) || first_row >= end_row {
+                continue;
+            }
+            let columns = (right.ceil() - left.floor()).min(self.width as f32) as u32;
+            let first_column = (left.floor() as i64).rem_euclid(i64::from(self.width)) as u32;
+            found.push([first_column, first_row, columns, end_row - first_row]);
+        }
+        found
+    }
+
+    /// How finely wide pixels look at what is narrower than they are.
+    fn set_samples(&mut self, params: &Params) {
+        let pixel = self.pixel_angle();
+        self.sky_samples = (pixel / GLOW).ceil().clamp(1.0, MOST_SKY) as u32;
+        let narrow = phase_width(params);
+        let samples = if pixel > 0.4 * narrow { (pixel / (0.2 * narrow)).ceil() } else { 1.0 };
+        self.phase_samples = samples.clamp(1.0, MOST_PHASE) as u32;
     }
 
     /// Whether pixels that look down on the clouds may be wider than those are (subrays.wgsl).
@@ -430,7 +592,7 @@ impl Frame {
         let sine = f64::from(Vec3::from_array(self.zenith).dot(Vec3::from_array(self.sun_direction)));
         let up = sine.clamp(-1.0, 1.0).asin() > -f64::from(self.horizon_dip) - HALF_SUN;
         let lit = up && params.sun.irradiance != [0.0; 3] && air.ground_albedo != [0.0; 3];
-        air.ground_shadows && air.enabled && clouds && lit && self.sees_below(camera, self.horizon_dip.into())
+        air.ground_shadows && clouds && lit && self.sees_below(camera, self.horizon_dip.into())
     }
 
     /// Whether clouds cast shadows on the air that `camera` sees.
@@ -489,10 +651,13 @@ impl Frame {
     }
 
     /// What the sky map is multiplied by: the deeper the sun under the horizon, the more, as dusk loses a factor of two or
-    /// more with every degree, to the 18th.
-    fn set_sky_scale(&mut self) {
+    /// more with every degree, to the 18th and, as then the night is what is seen, beyond.
+    fn set_sky_scale(&mut self, params: &Params) {
         let depth = -self.sun_sine().asin().to_degrees() - f64::from(self.horizon_dip).to_degrees();
-        self.sky_scale = (1024.0 * (0.75 * depth.clamp(0.0, 18.0)).exp2()) as f32;
+        self.sky_scale = (1024.0 * (0.75 * depth.clamp(0.0, 40.0)).exp2()) as f32;
+        // Where the night outshines all that the sun may give, it is 1000 in the map.
+        let unit = |sun: f32, night: f32| sun.max(1e-3 * self.sky_scale * night).max(1e-30);
+        self.sky_unit = std::array::from_fn(|i| unit(params.sun.irradiance[i], params.atmosphere.night[i]));
     }
 
     fn set_camera(&mut self, camera: &Camera) {

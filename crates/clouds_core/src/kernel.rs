@@ -109,6 +109,12 @@ pub(crate) struct Variant {
     pub ground_shadow: bool,
     /// Whether the sky and the depth are asked for, for `composite`.
     pub layers: bool,
+    /// Whether the sky varies within a pixel, for `composite`.
+    pub wide: bool,
+    /// Whether the pixels are those of a disc of light, for `composite`.
+    pub discs: bool,
+    /// Whether the phase function varies within a pixel.
+    pub wide_phase: bool,
     /// Which noises a weather map is baked from, for `weather`.
     pub weather_noise: WeatherNoise,
 }
@@ -147,6 +153,9 @@ impl Variant {
             cloudless: false,
             ground_shadow: false,
             layers: false,
+            wide: false,
+            discs: false,
+            wide_phase: false,
             weather_noise: WeatherNoise::WorleyPerlin,
         }
     }
@@ -165,11 +174,12 @@ impl Variant {
             scene: frame.scene > 0,
             subrays: params.volume.is_none() && frame.has_subrays(),
             sparse: frame.sparse > 0,
+            wide_phase: frame.phase_samples > 1,
             ..Self::new(params, quality)
         }
     }
 
-    fn constants(self) -> [(&'static str, f64); 28] {
+    fn constants(self) -> [(&'static str, f64); 31] {
         let switch = |on| f64::from(u8::from(on));
         [
             ("MODEL", f64::from(self.model as u32)),
@@ -199,6 +209,9 @@ impl Variant {
             ("CLOUDLESS", switch(self.cloudless)),
             ("GROUND_SHADOW", switch(self.ground_shadow)),
             ("LAYERS", switch(self.layers)),
+            ("WIDE", switch(self.wide)),
+            ("DISCS", switch(self.discs)),
+            ("WIDE_PHASE", switch(self.wide_phase)),
             ("WEATHER_NOISE", f64::from(self.weather_noise as u32)),
         ]
     }

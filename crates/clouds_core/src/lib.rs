@@ -14,6 +14,7 @@ pub mod generate;
 pub mod gpu;
 mod kernel;
 mod mie;
+mod moon;
 pub mod params;
 mod passes;
 pub mod renderer;

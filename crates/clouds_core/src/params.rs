@@ -99,6 +99,24 @@ params! {
         visible: bool = true;
     }
 
+    /// The moon. It lights air, clouds and ground as the sun does, casts shadows, and shines together with it. Its bright side is
+    /// toward the sun.
+    Moon {
+        /// Height above the horizon; at -90, the default, there is none.
+        elevation: f32 = -90.0, in -90..=90 "degrees";
+        /// Compass direction, clockwise from north.
+        azimuth: f32 = 180.0, in -360..=360 "degrees";
+        /// Age as a share of a month: 0 is new, 0.25 half, 0.5 full, 0.75 half again and 1 new. A half moon has a tenth of the
+        /// light of a full one (Krisciunas and Schaefer 1991).
+        phase: f32 = 0.5, in 0..=1 "";
+        /// Irradiance of the full moon on a plane that faces it, above the air, in the unit of `sun.irradiance`. The default is
+        /// as much less than a sun of 10 as the magnitude of -12.73 is than -26.74, and as much redder as B - V = 0.92 is than 0.65
+        /// (Allen's Astrophysical Quantities).
+        irradiance: [f32; 3] = [2.7e-5, 2.5e-5, 2.0e-5], in 0..=1000000 "";
+        /// Whether the moon's disc is drawn.
+        visible: bool = true;
+    }
+
     /// The volumetric clouds: where they are and what they are made of.
     Clouds {
         /// How much of the sky is cloudy: shifts the weather map's coverage, 0 is clear, 0.5 the map as it is, 1 overcast.
@@ -351,12 +369,13 @@ params! {
 
     /// The planet and its air.
     Atmosphere {
-        /// Whether there is air; without it the sky is black and sunlight arrives undimmed.
+        /// Whether there is air; without it the sky is black, day and night, and sunlight arrives undimmed.
         enabled: bool = true;
         /// Radius of the planet (Earth 6 371 000, thesis2018 400 000).
         planet_radius: f32 = 6371000.0, in 10000..=1000000000 "m";
-        /// Haze: amount of aerosol, 1 is a clear day.
-        haze: f32 = 1.0, in 0..=20 "";
+        /// Haze: amount of aerosol. Each unit is an optical depth of 0.0053 straight up from the ground, at 550 nm as at all
+        /// wavelengths: 1 is air as clear as over the Antarctic, 10 to 20 a clear day (0.05 to 0.1), 94 thick haze (0.5).
+        haze: f32 = 1.0, in 0..=100 "";
         /// How much air stands between the eye and the clouds: 1 is physical, 0 none.
         aerial_perspective: f32 = 1.0, in 0..=10 "";
         /// Whether clouds cast shadows on the ground that is seen.
@@ -365,6 +384,9 @@ params! {
         beams: bool = true;
         /// Albedo of the ground.
         ground_albedo: [f32; 3] = [0.10, 0.12, 0.07], in 0..=1 "";
+        /// Radiance of the night's own light above the air, airglow and stars, which is there by day too: 20.9, 21.6 and 22.6
+        /// magnitudes a square arcsecond in R, V and B (Patat 2003) beside a sun of 10 and of -27.1, -26.74 and -26.09.
+        night: [f32; 3] = [2.7e-8, 2.0e-8, 1.4e-8], in 0..=1000000 "";
     }
 
     /// The numerical method: how accurately a sky is computed, never how it looks.
@@ -429,6 +451,7 @@ params! {
 #[expect(missing_docs, reason = "each block says what it is")]
 pub struct Params {
     pub sun: Sun,
+    pub moon: Moon,
     pub clouds: Clouds,
     pub upper_clouds: UpperClouds,
     pub weather: Weather,
@@ -443,6 +466,8 @@ pub struct Params {
     pub weather_mix: Vec<(Weather, f32)>,
     /// A cloud of the user's own in place of the procedural ones.
     pub volume: Option<Arc<DensityGrid>>,
+    /// Unit vector toward the sun, where `sun` holds the moon's light (moon.rs).
+    pub(crate) lights_moon: Option<[f64; 3]>,
 }
 
 /// A larger weather map.
@@ -492,9 +517,10 @@ fn shown(cover: f32) -> f32 {
 
 impl Params {
     /// The blocks with their names.
-    pub fn blocks(&self) -> [(&'static str, &dyn Block); 10] {
+    pub fn blocks(&self) -> [(&'static str, &dyn Block); 11] {
         [
             ("sun", &self.sun),
+            ("moon", &self.moon),
             ("clouds", &self.clouds),
             ("upper_clouds", &self.upper_clouds),
             ("weather", &self.weather),
@@ -508,9 +534,10 @@ impl Params {
     }
 
     /// The same, to set them.
-    pub fn blocks_mut(&mut self) -> [(&'static str, &mut dyn Block); 10] {
+    pub fn blocks_mut(&mut self) -> [(&'static str, &mut dyn Block); 11] {
         [
             ("sun", &mut self.sun),
+            ("moon", &mut self.moon),
             ("clouds", &mut self.clouds),
             ("upper_clouds", &mut self.upper_clouds),
             ("weather", &mut self.weather),
@@ -848,6 +875,7 @@ fn check_block(name: &str, block: &dyn Block) -> Result<()> {
 pub fn block(type_name: &str) -> Option<Box<dyn Block>> {
     let Params {
         sun,
+        moon,
         clouds,
         upper_clouds,
         weather,
@@ -859,10 +887,12 @@ pub fn block(type_name: &str) -> Option<Box<dyn Block>> {
         atmosphere,
         weather_mix: _,
         volume: _,
+        lights_moon: _,
     } = Params::default();
     let quality = Quality::default();
-    let blocks: [Box<dyn Block>; 11] = [
+    let blocks: [Box<dyn Block>; 12] = [
         Box::new(sun),
+        Box::new(moon),
         Box::new(clouds),
         Box::new(upper_clouds),
         Box::new(weather),

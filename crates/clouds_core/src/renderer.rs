@@ -14,6 +14,7 @@ use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::gpu::{Gpu, Interrupt, Timings, check_fork};
 use crate::kernel::{Binding, Kernel, Variant, Wanted};
+use crate::moon::Lights;
 use crate::params::{self, Model, Params, Quality};
 use crate::passes::beams::{self, Beams};
 use crate::passes::broad_weather::BroadWeather;
@@ -53,6 +54,8 @@ pub struct Renderer {
     animation: Option<Animation>,
     going: Going,
     refining: Option<Refining>,
+    /// Makes what the moon lights, where that is seen.
+    moonlit: Option<Box<Self>>,
     march_pace: Pace,
     reproject_pace: Pace,
     pixel_pace: Pace,
@@ -108,11 +111,14 @@ impl Method {
         let composite: &[_] = if self.by_cells(frame, quality) { &composite::CELLS } else { &composite::WHOLE };
         let composite = composite.iter().map(with(composite::variant(variant, frame, layers)));
         let clouds = clouds.iter().map(with(variant));
+        let discs = Variant { discs: true, ..composite::variant(variant, frame, layers) };
+        let discs = (!frame.disc_pixels(params).is_empty()).then_some(("composite", "composite_discs", discs));
         bakes
             .chain(shadow::kernels(frame, variant))
             .chain(beams::kernel(variant))
             .chain(clouds)
             .chain(composite)
+            .chain(discs)
             .collect()
     }
 
@@ -196,23 +202,29 @@ impl Renderer {
             scope.spawn(|| LazyLock::force(&blue_noise::TILE));
             Gpu::open(adapter)
         })?;
+        Ok(Self::on(gpu, [width, height], quality))
+    }
+
+    /// The same on a device that is open.
+    fn on(gpu: Arc<Gpu>, size: [u32; 2], quality: Quality) -> Self {
         let pace = Pace::new(if gpu.info.kind == "cpu" { 3e5 } else { 1e8 });
-        Ok(Self {
+        Self {
             world: World::new(&gpu),
             still: None,
             animation: None,
             going: Going::default(),
             refining: None,
+            moonlit: None,
             march_pace: pace,
             reproject_pace: pace,
             pixel_pace: pace,
             // Its texels may take many times as long as a pixel's march.
             shadow_pace: Pace::new(if gpu.info.kind == "cpu" { 1e4 } else { 1e6 }),
             timings: Timings::default(),
-            size: [width, height],
+            size,
             quality,
             gpu,
-        })
+        }
     }
 
     /// What the last picture has left on the GPU: for whom, the variable of the shaders, and bytes.
@@ -233,6 +245,7 @@ impl Renderer {
             add("animation", vec![("scene_before", scene_before.depth())]);
             add("animation", [before.bindings(), now.bindings()].concat());
         }
+        held.extend(self.moonlit.iter().flat_map(|lit| lit.memory()));
         held
     }
 
@@ -247,8 +260,11 @@ impl Renderer {
         quality.check()?;
         check_size([width, height])?;
         self.size = [width, height];
-        self.quality = quality;
         self.refining = None;
+        if let Some(lit) = &mut self.moonlit {
+            lit.set(width, height, quality.clone())?;
+        }
+        self.quality = quality;
         Ok(())
     }
 
@@ -273,7 +289,45 @@ impl Renderer {
         scene_depth: Option<SceneDepth<'_>>,
         interrupt: Interrupt<'_>,
     ) -> Result<Picture> {
-        self.still(camera, params, time, background, all, 0, scene_depth, interrupt)
+        let Lights { sun, moon } = self.lights(camera, params, time)?;
+        let still = |lit: &mut Self, sky: &Params, scene: Option<SceneDepth<'_>>| {
+            lit.still(camera, sky, time, background, all, 0, scene, interrupt)
+        };
+        let Some(moon) = moon else { return still(self, sun.as_ref().unwrap_or(params), scene_depth) };
+        let first = sun.map(|sun| still(self, &sun, scene_depth)).transpose()?;
+        let black = black(scene_depth, first.is_some());
+        let scene = scene_of(scene_depth, black.as_deref());
+        let second = self.by_moon(|lit| still(lit, &moon, scene), first.is_some())?;
+        Ok(match first {
+            Some(first) => first.and(&second),
+            None => second,
+        })
+    }
+
+    /// What lights a sky.
+    fn lights(&mut self, camera: &Camera, params: &Params, time: f64) -> Result<Lights> {
+        if !params.moon.exists() {
+            return Ok(Lights { sun: Some(params.clone()), moon: None });
+        }
+        let (frame, _) = self.begin(camera, params, time)?;
+        Ok(Lights::new(params, &frame))
+    }
+
+    /// What the renderer of moonlight makes; its times are a part of ours, or all of them.
+    fn by_moon<T>(&mut self, make: impl FnOnce(&mut Self) -> Result<T>, part: bool) -> Result<T> {
+        let mut lit = match self.moonlit.take() {
+            Some(lit) => lit,
+            None => Box::new(Self::on(self.gpu.clone(), self.size, self.quality.clone())),
+        };
+        let made = make(&mut lit);
+        let times = mem::take(&mut lit.timings);
+        self.moonlit = Some(lit);
+        if part {
+            times.0.iter().for_each(|(label, time)| self.timings.add(label, *time));
+        } else {
+            self.timings = times;
+        }
+        made
     }
 
     /// A still; `first_sample` is the number of the first path of each pixel.
@@ -354,7 +408,7 @@ impl Renderer {
             let parts = Parts { marched, backdrop, refined, out: composed };
             frame.rows = sheet.len() as u32;
             let mut ctx = Context { gpu, uniforms: scene.uniforms, variant: scene.variant, timings, interrupt };
-            compose_sheet(&mut ctx, &scene, &mut frame, &mut self.pixel_pace, &parts, by_cells, all)?;
+            compose_sheet(&mut ctx, &scene, &mut frame, params, &mut self.pixel_pace, &parts, by_cells, all)?;
             let mut work = gpu.work();
             let pixels = u64::from(width) * sheet.len() as u64;
             work.download(&composed.image, 0, 16 * pixels);
@@ -402,7 +456,7 @@ impl Renderer {
         scene_depth: Option<SceneDepth<'_>>,
         interrupt: Interrupt<'_>,
     ) -> Result<Vec<f32>> {
-        self.next_frame(camera, params, time, background, scene_depth, None, interrupt)
+        self.lit_frame(camera, params, time, background, scene_depth, None, interrupt)
     }
 
     /// The same, of the whole sky, onto a screen of the size of the pictures, without bringing it to memory.
@@ -419,7 +473,39 @@ impl Renderer {
             let [w, h] = self.size;
             return Err(Error::parameter("screen", format!("{width} x {height}"), format!("of {w} x {h} pixels")));
         }
-        self.next_frame(camera, params, time, true, None, Some(screen), interrupt).map(drop)
+        self.lit_frame(camera, params, time, true, None, Some(screen), interrupt).map(drop)
+    }
+
+    /// The next frame by the light of sun, moon or both, each of which is followed by itself.
+    #[expect(clippy::too_many_arguments, reason = "what a frame depends on")]
+    fn lit_frame(
+        &mut self,
+        camera: &Camera,
+        params: &Params,
+        time: f64,
+        background: bool,
+        scene_depth: Option<SceneDepth<'_>>,
+        screen: Option<&Screen>,
+        interrupt: Interrupt<'_>,
+    ) -> Result<Vec<f32>> {
+        let Lights { sun, moon } = self.lights(camera, params, time)?;
+        let Some(moon) = moon else {
+            self.moonlit.iter_mut().for_each(|lit| lit.forget());
+            let sky = sun.as_ref().unwrap_or(params);
+            return self.next_frame(camera, sky, time, background, scene_depth, screen, interrupt);
+        };
+        let Some(sun) = sun else {
+            self.forget();
+            let make = |lit: &mut Self| lit.next_frame(camera, &moon, time, background, scene_depth, screen, interrupt);
+            return self.by_moon(make, false);
+        };
+        let mut image = self.next_frame(camera, &sun, time, background, scene_depth, None, interrupt)?;
+        let black = black(scene_depth, true);
+        let scene = scene_of(scene_depth, black.as_deref());
+        let make = |lit: &mut Self| lit.next_frame(camera, &moon, time, background, scene, None, interrupt);
+        add_light(&mut image, &self.by_moon(make, true)?);
+        screen.map_or(Ok(()), |screen| screen.write(&self.gpu, &image))?;
+        Ok(image)
     }
 
     /// The next frame, onto a screen or, without one, to memory.
@@ -538,7 +624,7 @@ impl Renderer {
         let parts = Parts { marched: &now.marched, backdrop, refined, out: composed };
         let mut ctx = Context { gpu, uniforms: scene.uniforms, variant: scene.variant, timings, interrupt };
         let by_cells = Method::March.by_cells(&frame, quality);
-        compose_sheet(&mut ctx, &scene, &mut frame, &mut self.pixel_pace, &parts, by_cells, false)?;
+        compose_sheet(&mut ctx, &scene, &mut frame, params, &mut self.pixel_pace, &parts, by_cells, false)?;
         let mut work = gpu.work();
         if let Some(screen) = screen {
             frame.first_row = 0;
@@ -631,6 +717,11 @@ impl Renderer {
 
     /// Forgets the frame before: the next one of [`Renderer::animate`] is a still.
     pub fn cut(&mut self) {
+        self.forget();
+        self.moonlit.iter_mut().for_each(|lit| lit.forget());
+    }
+
+    fn forget(&mut self) {
         self.refining = None;
         self.going = Going::default();
         if let Some(animation) = &mut self.animation {
@@ -842,6 +933,35 @@ struct World {
     scene_depth: SceneTextures,
     /// Names and bytes of all of it, as it was bound last.
     memory: Vec<(&'static str, u64)>,
+}
+
+impl Picture {
+    /// The picture of the same sky by the light of both.
+    fn and(mut self, other: &Self) -> Self {
+        add_light(&mut self.image, &other.image);
+        add_light(&mut self.sky, &other.sky);
+        self.samples.iter_mut().zip(&other.samples).for_each(|(sum, more)| *sum += more);
+        // Both have the same paths, so that their errors may be of one sign.
+        self.uncertainty.iter_mut().zip(&other.uncertainty).for_each(|(sum, more)| *sum += more);
+        self
+    }
+}
+
+/// Adds the light of another picture of the same sky, whose alpha is the same.
+fn add_light(image: &mut [f32], other: &[f32]) {
+    for (sum, more) in image.chunks_exact_mut(4).zip(other.chunks_exact(4)) {
+        sum[..3].iter_mut().zip(more).for_each(|(sum, more)| *sum += more);
+    }
+}
+
+/// The radiance of the user's scene where another picture has it already: none.
+fn black(scene: Option<SceneDepth<'_>>, known: bool) -> Option<Vec<f32>> {
+    scene.and_then(|scene| scene.color).filter(|_| known).map(|color| vec![0.0; color.len()])
+}
+
+/// The scene, of another radiance where there is one.
+fn scene_of<'a>(scene: Option<SceneDepth<'a>>, color: Option<&'a [f32]>) -> Option<SceneDepth<'a>> {
+    scene.map(|scene| SceneDepth { distance: scene.distance, color: color.or(scene.color) })
 }
 
 impl World {
@@ -1175,8 +1295,33 @@ fn march_listed(
     })
 }
 
-/// Composes the sheet of `frame`: cells, then the pixels of those that are not smooth, or all of them.
+/// Composes the sheet of `frame`: cells, then the pixels of those that are not smooth, or all of them; then those in which a disc
+/// of light is seen.
+#[expect(clippy::too_many_arguments, reason = "what a picture is composed of")]
 fn compose_sheet(
+    ctx: &mut Context<'_>,
+    scene: &Scene<'_>,
+    frame: &mut Frame,
+    params: &Params,
+    pace: &mut Pace,
+    parts: &Parts<'_>,
+    by_cells: bool,
+    layers: bool,
+) -> Result<()> {
+    let discs = frame.disc_pixels(params);
+    compose_all(ctx, scene, frame, pace, parts, by_cells, layers)?;
+    for [first_column, first_row, columns, rows] in discs {
+        let frame = Frame { first_column, first_row, columns, rows, ..frame.clone() };
+        scene.uniforms.upload_frame(ctx.gpu, &frame);
+        let mut work = ctx.gpu.work();
+        composite::run_discs(ctx.gpu, &mut work, scene, &frame, parts, layers)?;
+        work.submit(ctx.timings, ctx.interrupt)?;
+    }
+    Ok(())
+}
+
+/// The same but for discs.
+fn compose_all(
     ctx: &mut Context<'_>,
     scene: &Scene<'_>,
     frame: &mut Frame,

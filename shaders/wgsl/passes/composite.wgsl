@@ -3,6 +3,7 @@
 #import workgroups
 #import camera
 #import atmosphere
+#import disc
 #import high_light
 #import lattice
 #import scene_depth
@@ -12,12 +13,8 @@ override HIGH: bool = true; // there are high clouds
 override CLOUDLESS: bool = false; // nothing has been marched
 override GROUND_SHADOW: bool = false; // clouds cast shadows on the ground in sight
 override LAYERS: bool = true; // the sky and the depth are asked for
-
-// The sun's angular radius, 0.2666 degrees (IAU: 695 700 km at 1 au).
-const SUN_RADIUS = 0.004654;
-// Exponents of the cosine at the sun's surface by which its limb darkens, at 680, 550 and 440 nm (Hestroffer and Magnan
-// 1998, after Hillaire 2016).
-const LIMB = vec3f(0.397, 0.503, 0.652);
+override DISCS: bool = false; // the pixels of a disc of light (disc.wgsl)
+override WIDE: bool = false; // the sky varies within a pixel
 
 // Second difference between corners of cells past which each pixel of a cell is worked out, as a share of the contrast past
 // which clouds are marched, of the brightest corner: of brightness, of the transmittance of the high clouds, and of the
@@ -47,6 +44,15 @@ fn composite(
     compose(vec2u(id.x, frame.first_row + id.y));
 }
 
+// The pixels that discs of light are seen in: those of `frame.columns` columns from `frame.first_column` on, around a panorama.
+@compute @workgroup_size(8, 8)
+fn composite_discs(@builtin(global_invocation_id) id: vec3u) {
+    if id.x >= frame.columns || id.y >= frame.rows {
+        return;
+    }
+    compose(vec2u((frame.first_column + id.x) % frame.width, frame.first_row + id.y));
+}
+
 // A pixel of the picture.
 fn compose(pixel: vec2u) {
     let index = (pixel.y - frame.sheet_row) * frame.width + pixel.x;
@@ -61,7 +67,32 @@ fn compose(pixel: vec2u) {
     }
     let at = vec2u(pixel.x, pixel.y - frame.sheet_row);
     let here = marched_layer(at / TILE, sparse_cell(at / TILE), at.y % TILE * TILE + at.x % TILE);
-    put(index, sight_of(view.xyz, pixel, scene_distance(pixel), here));
+    let scene = scene_distance(pixel);
+    var sight = sight_of(view.xyz, vec2f(pixel), pixel, scene, here);
+    if DISCS {
+        sight.background += select(discs_in_pixel(pixel), vec3f(0.0), scene < NO_SCENE);
+    }
+    put(index, sight);
+}
+
+// Radiance of the air in a wide pixel, the mean: the glow around the sun is narrower than it. On the side of the horizon that its
+// middle is on.
+fn wide_sky(direction: vec3f, corner: vec2f, grounded: bool) -> vec3f {
+    if !WIDE {
+        return sky_radiance(direction);
+    }
+    let n = frame.sky_samples;
+    var sum = vec3f(0.0);
+    var whole = 0.0;
+    for (var i = 0u; i < n * n; i++) {
+        let at = corner + (vec2f(vec2u(i % n, i / n)) + 0.5) / f32(n);
+        let there = view_direction(at).xyz;
+        let beside = hit_sphere(there, frame.power_ground).enters == grounded;
+        let weight = select(0.0, place_weight(at), beside);
+        sum += weight * sky_radiance(there);
+        whole += weight;
+    }
+    return select(sky_radiance(direction), sum / max(whole, 1e-30), whole > 0.0);
 }
 
 // What has been marched at the corners of a cell of a sparse picture.
@@ -138,7 +169,7 @@ fn backdrop(@builtin(global_invocation_id) id: vec3u) {
     }
     let pixel = (vec2f(id.xy) - 1.0) * f32(TILE) + vec2f(0.0, f32(frame.sheet_row));
     let view = view_direction(pixel + 0.5);
-    let sight = sight_of(view.xyz, vec2u(0u, frame.sheet_row), NO_SCENE, Layer(vec3f(0.0), 1.0, 0.0));
+    let sight = sight_of(view.xyz, pixel, vec2u(0u, frame.sheet_row), NO_SCENE, Layer(vec3f(0.0), 1.0, 0.0));
     let ground = hit_sphere(view.xyz, frame.power_ground);
     var layer = vec4f(sight.seen.radiance, sight.seen.transmittance);
     var distance = sight.seen.distance;
@@ -151,9 +182,7 @@ fn backdrop(@builtin(global_invocation_id) id: vec3u) {
         distance = FINE;
     }
     distance = select(distance, -1.0 - distance, ground.enters);
-    // The sun's disc is smaller than a cell.
-    let near_sun = SUN_RADIUS + f32(2u * TILE) * pixel_width();
-    if view.w == 0.0 || one_minus_cos(view.xyz, frame.sun_direction) < 0.5 * near_sun * near_sun {
+    if view.w == 0.0 {
         distance = EDGE;
     }
     let behind = vec4f(sight.background + sight.shadow, distance);
@@ -188,7 +217,7 @@ fn is_fine(direction: vec3f, ground: Hit) -> bool {
 // How far a cell reaches along a sphere that its ray meets at a distance, m.
 fn cell_across(direction: vec3f, distance: f32, altitude: f32) -> f32 {
     let cosine = abs(cos_zenith_along(direction, distance, altitude));
-    return distance * f32(TILE) * pixel_width() / max(cosine, 1e-6);
+    return distance * f32(TILE) * pixel_width(direction) / max(cosine, 1e-6);
 }
 
 // Puts the clouds of a cell before what lies behind them, or lists it.
@@ -284,7 +313,8 @@ fn composite_cells(
         loop {
             if fine_high && in_sheet(first, n) {
                 let direction = view_direction(vec2f(cell_pixel(first, n)) + 0.5).xyz;
-                let layer = high_layer(direction, hit_sphere(direction, frame.power_high).far, true);
+                let turned = seen_turn(direction, vec2f(cell_pixel(first, n)));
+                let layer = high_layer(direction, hit_sphere(direction, frame.power_high).far, true, turned);
                 let shares = corner_shares(n);
                 let before = Air((air * shares).rgb, (haze * shares).rgb);
                 put_behind(sheet_index(first, n), marched_layer(id.xy, sparse, n), through_air(layer, before), (behind * shares).rgb);
@@ -419,8 +449,9 @@ fn sight_to(seen: Layer, background: vec3f) -> Sight {
     return Sight(seen, background, 1.0, Air(vec3f(1.0), vec3f(0.0)), vec3f(0.0), vec3f(0.0));
 }
 
-// What is seen in a direction, with the clouds that were marched there, to the user's scene at a pixel.
-fn sight_of(direction: vec3f, pixel: vec2u, scene: f32, here: Layer) -> Sight {
+// What is seen in a direction, with the clouds that were marched there, to the user's scene at a pixel. `corner` is that of the
+// pixel that looks there.
+fn sight_of(direction: vec3f, corner: vec2f, pixel: vec2u, scene: f32, here: Layer) -> Sight {
     let ground = hit_sphere(direction, frame.power_ground);
     var way = Way(0.0, 0.0, ground.enters);
     var texels = AirTexels(vec2f(0.0), vec2f(0.0));
@@ -429,7 +460,7 @@ fn sight_of(direction: vec3f, pixel: vec2u, scene: f32, here: Layer) -> Sight {
     if AIR {
         way = air_way(direction);
         texels = air_texels(direction);
-        sky_behind = sky_radiance(direction);
+        sky_behind = wide_sky(direction, corner, ground.enters);
         air = whole_air(direction, way, texels, sky_behind);
     }
 
@@ -439,6 +470,7 @@ fn sight_of(direction: vec3f, pixel: vec2u, scene: f32, here: Layer) -> Sight {
         // The high clouds where the ray enters their sphere, which it cannot from inside, and where it leaves it; each
         // before or behind the clouds. The loop costs lavapipe one of the two where there is one, a branch both.
         let high = hit_sphere(direction, frame.power_high);
+        let turned = seen_turn(direction, corner);
         var before = Layer(vec3f(0.0), 1.0, 0.0);
         var behind = before;
         var crossing = select(0, 1, frame.power_high <= 0.0);
@@ -446,7 +478,7 @@ fn sight_of(direction: vec3f, pixel: vec2u, scene: f32, here: Layer) -> Sight {
             let at = select(high.near, high.far, crossing == 1);
             let hit = high.hit && at > 0.0 && at < scene && !(ground.enters && at > ground.near);
             found.high_air = air_to(direction, at, way, texels, sky_behind);
-            let layer = through_air(high_layer(direction, at, hit), found.high_air);
+            let layer = through_air(high_layer(direction, at, hit, turned), found.high_air);
             if at < here.distance {
                 before = over(before, layer);
             } else {
@@ -462,15 +494,13 @@ fn sight_of(direction: vec3f, pixel: vec2u, scene: f32, here: Layer) -> Sight {
 
     if ground.enters {
         let p = ground.near * direction;
-        found.background += air.transmittance * ground_seen(p);
+        found.background += air.transmittance * ground_radiance(cos_zenith_at(p, frame.sun_direction));
         if GROUND_SHADOW {
             let mu = cos_zenith_at(p, frame.sun_direction);
             found.sunlight = air.transmittance * kept_sunlight(mu);
             found.shadow = (1.0 - ground_sun(p, mu)) * found.sunlight;
             found.background = max(found.background - found.shadow, vec3f(0.0));
         }
-    } else if params.sun.visible > 0u {
-        found.background += air.transmittance * sun_disc(direction);
     }
     if SCENE && scene < NO_SCENE {
         let bright = scene_radiance(pixel);
@@ -502,13 +532,6 @@ fn ground_sun(p: vec3f, mu: f32) -> f32 {
     return sun;
 }
 
-fn ground_seen(p: vec3f) -> vec3f {
-    if AIR {
-        return ground_radiance(cos_zenith_at(p, frame.sun_direction));
-    }
-    return vec3f(0.0);
-}
-
 // The air before a distance on a ray, if there is any.
 fn air_to(direction: vec3f, distance: f32, way: Way, texels: AirTexels, sky: vec3f) -> Air {
     if AIR {
@@ -535,13 +558,3 @@ fn over(front: Layer, back: Layer) -> Layer {
     );
 }
 
-// Radiance of the sun's disc before the air, its edge one pixel soft.
-fn sun_disc(direction: vec3f) -> vec3f {
-    let angle = sqrt(2.0 * one_minus_cos(direction, frame.sun_direction));
-    let edge = max(pixel_width(), 1e-4);
-    let cover = saturate((SUN_RADIUS - angle) / edge + 0.5);
-    // Its limb is darker (Hestroffer and Magnan 1998), whole it is as bright as the irradiance says.
-    let ratio = min(angle / SUN_RADIUS, 1.0);
-    let limb = pow(vec3f(max(1.0 - ratio * ratio, 0.02)), 0.5 * LIMB);
-    return cover * params.sun.irradiance * limb * (1.0 + 0.5 * LIMB) / (PI * SUN_RADIUS * SUN_RADIUS);
-}

@@ -71,7 +71,7 @@ fn march_pixel(pixel: vec2u, view: vec3f, within: vec2f) -> Cloud {
     let offset = ray_offset(pixel);
     let rays = rays_through(view);
     if !SUBRAYS {
-        return march_ray(view, limit, offset, within, rays);
+        return march_ray(view, pixel, limit, offset, within, rays);
     }
     // Low-discrepancy sequences (R2, golden ratio) from where blue noise has it.
     let shift = vec2f(offset, ray_offset(pixel + vec2u(29u, 13u)));
@@ -82,7 +82,7 @@ fn march_pixel(pixel: vec2u, view: vec3f, within: vec2f) -> Cloud {
         let place = ray_place(pixel, fract(shift + k * vec2f(0.7548776662, 0.5698402910)), rays);
         let direction = view_direction(place).xyz;
         let known = select(EVERYWHERE, within, rays <= 1.0);
-        let cloud = march_ray(direction, limit, fract(offset + 0.6180339887 * k), known, rays);
+        let cloud = march_ray(direction, pixel, limit, fract(offset + 0.6180339887 * k), known, rays);
         let weight = depth_weight(cloud.transmittance, cloud.depth);
         // Under a condition that differs by pixel: else lavapipe adds to those that are done what the others' next turn finds
         // (docs/numerics.md).
@@ -298,7 +298,7 @@ fn way_to_decks(direction: vec3f, leap: f32, at: Sample) -> f32 {
 // Steps for each that a big step leaps over: where those leap over none, nothing does.
 const LONGEST_LEAP = 16.0;
 
-fn march_ray(direction: vec3f, limit: f32, offset: f32, within: vec2f, rays: f32) -> Cloud {
+fn march_ray(direction: vec3f, pixel: vec2u, limit: f32, offset: f32, within: vec2f, rays: f32) -> Cloud {
     let stretches = stretches_before(cloud_stretches(direction), limit);
     let length = stretches.first + stretches.second;
     // The optical depth is summed, not the transmittance multiplied: a thousand factors of almost 1 are all 1, or all
@@ -309,11 +309,11 @@ fn march_ray(direction: vec3f, limit: f32, offset: f32, within: vec2f, rays: f32
         return Cloud(vec3f(0.0), 1.0, -1.0, NOWHERE);
     }
     let steps = ray_steps(stretches.start, length, direction, rays);
-    let pixel_size = pixel_width();
+    let pixel_size = pixel_width(direction);
     let sunlit = is_sunlit();
     let nodes = ray_nodes(stretches.start, stretch_distance(stretches, length) - stretches.start);
 
-    let one_minus_mu = one_minus_cos(direction, frame.sun_direction);
+    let turned = seen_turn(direction, vec2f(pixel));
     var sum = Gathered();
 
     let big = quality.big_step;
@@ -397,7 +397,7 @@ fn march_ray(direction: vec3f, limit: f32, offset: f32, within: vec2f, rays: f32
                 if SUNLIT && sunlit {
                     depth_to_sun = optical_depth_to_sun(lit.distance * direction, lit.opacity, lit.width);
                 }
-                let sun = sun_scattering(depth_to_sun, lit.precipitation, one_minus_mu);
+                let sun = seen_scattering(depth_to_sun, lit.precipitation, turned);
                 sum = gather(sum, nodes, lit.weight, sun, lit.above, lit.distance);
                 if count == 0u {
                     break;

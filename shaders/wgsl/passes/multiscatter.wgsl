@@ -141,8 +141,7 @@ fn order_before(table: u32, h: f32, mu: f32) -> vec3f {
     return from_table(textureSampleLevel(mix_a, clamp_sampler, table_coordinates(table, h, mu), 0.0).rgb);
 }
 
-// The sum of four orders and of those that follow, each the share of the one before that the fourth is of the third; and
-// the light of the night.
+// The sum of four orders and of those that follow, each the share of the one before that the fourth is of the third.
 @compute @workgroup_size(8, 8)
 fn sum_orders(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= textureDimensions(map_out)) {
@@ -150,9 +149,7 @@ fn sum_orders(@builtin(global_invocation_id) id: vec3u) {
     }
     let third = from_table(textureLoad(mix_c, id.xy, 0).rgb);
     let fourth = from_table(textureLoad(mix_d, id.xy, 0).rgb);
-    let rest = fourth / (1.0 - min(fourth / third, vec3f(0.95)));
-    var sum = from_table(textureLoad(mix_a, id.xy, 0).rgb) + from_table(textureLoad(mix_b, id.xy, 0).rgb) + third + rest;
-    let table = id.y / TABLE_ALTITUDES;
-    sum += select(NIGHT * select(params.atmosphere.ground_albedo, vec3f(1.0), table == FROM_ABOVE), vec3f(0.0), table != FROM_ABOVE && table != FROM_BELOW);
+    let rest = fourth / (1.0 - min(fourth / max(third, vec3f(TABLE_NONE)), vec3f(0.95)));
+    let sum = from_table(textureLoad(mix_a, id.xy, 0).rgb) + from_table(textureLoad(mix_b, id.xy, 0).rgb) + third + rest;
     textureStore(map_out, id.xy, vec4f(to_table(sum), 1.0));
 }

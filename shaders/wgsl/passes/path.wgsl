@@ -37,7 +37,8 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
     let pixel = vec2u(index % frame.width, frame.sheet_row + index / frame.width);
     let middle = view_direction(vec2f(pixel) + 0.5);
     let rays = rays_through(middle.xyz);
-    let pixel_size = pixel_width();
+    let seen = seen_turn(middle.xyz, vec2f(pixel));
+    let pixel_size = pixel_width(middle.xyz);
     let sunlit = is_sunlit();
 
     var ray = path_rays[index];
@@ -105,7 +106,7 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
                 if ray.scatterings > quality.path_scatterings {
                     ray = path_ended(ray);
                 } else if sunlit {
-                    let phase = path_phase(one_minus_cos(direction, frame.sun_direction));
+                    let phase = select(model_phase(one_minus_cos(direction, frame.sun_direction)), seen.phase, ray.scatterings == 1u);
                     ray.sunlight = ray.throughput * phase * sun_at(p);
                     ray.shadow = 1.0;
                     ray.flight = flight_from(p, frame.sun_direction);
@@ -198,13 +199,6 @@ fn scattered_on(given: PathRay, pixel: vec2u) -> PathRay {
     return ray;
 }
 
-fn path_phase(one_minus_mu: f32) -> f32 {
-    if PHASE == PHASE_HENYEY_GREENSTEIN {
-        return henyey_greenstein(one_minus_mu, params.light.g);
-    }
-    return droplet_phase(one_minus_mu);
-}
-
 // Out of the clouds: to the eye's background if it met none, else to the sky or to the ground.
 fn escaped(given: PathRay, pixel: vec2u) -> PathRay {
     var ray = given;
@@ -212,12 +206,11 @@ fn escaped(given: PathRay, pixel: vec2u) -> PathRay {
         return path_ended(ray);
     }
     ray.light += ray.throughput * params.light.ambient;
-    if !AIR {
-        return path_ended(ray);
-    }
     let ground = hit_ground_from(ray.origin, ray.direction);
     if !ground.enters {
-        ray.light += ray.throughput * params.light.ambient_gain * sky_radiance(ray.direction);
+        if AIR {
+            ray.light += ray.throughput * params.light.ambient_gain * sky_radiance(ray.direction);
+        }
         return path_ended(ray);
     }
     ray.scatterings += 1u;

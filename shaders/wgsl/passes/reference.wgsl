@@ -44,11 +44,11 @@ fn reference(@builtin(global_invocation_id) id: vec3u) {
     let stretches = stretches_before(cloud_stretches(direction), scene_distance(pixel));
     let length = select(0.0, stretches.first + stretches.second, view.w > 0.0);
     let empty = length <= 0.0 || (!VOLUME && !UPPER && params.clouds.coverage <= 0.0);
-    let one_minus_mu = one_minus_cos(direction, frame.sun_direction);
+    let turned = seen_turn(direction, vec2f(pixel));
     let sunlit = is_sunlit();
     let nodes = ray_nodes(stretches.start, stretch_distance(stretches, length) - stretches.start);
     let opaque = dark_depth();
-    let pixel_size = pixel_width();
+    let pixel_size = pixel_width(direction);
 
     var ray = reference_rays[index];
     evaluations = ray.evaluations;
@@ -144,8 +144,8 @@ fn reference(@builtin(global_invocation_id) id: vec3u) {
             let first = first_share(x, ray.density);
             var sun = vec2f(0.0);
             if sunlit {
-                sun.x = sun_scattering(ray.first_depth, ray.precipitation.x, one_minus_mu);
-                sun.y = sun_scattering(ray.sun_depth, ray.precipitation.y, one_minus_mu);
+                sun.x = seen_scattering(ray.first_depth, ray.precipitation.x, turned);
+                sun.y = seen_scattering(ray.sun_depth, ray.precipitation.y, turned);
             }
             let uneven = abs(ray.sun_depth - ray.first_depth) > finer * UNEVEN
                 && weight * abs(sun.x - sun.y) > 0.1 * quality.tolerance * (dot(ray.sun, vec4f(1.0)) + DARK);

@@ -82,6 +82,7 @@ fn predict(@builtin(global_invocation_id) id: vec3u) {
     let way = frame.eye_motion - frame.cloud_motion;
     let was = previous_pixel(normalize(away * direction + way));
     past.approach = dot(way, direction);
+    past.width = pixel_width(direction) * f32(spacing());
     let sun = acos(clamp(dot(direction, frame.sun_direction), -1.0, 1.0));
     let sun_before = acos(clamp(dot(normalize(away * direction + way), frame.previous_sun), -1.0, 1.0));
     past.glare = GLARE_SLOPE * abs(sun - sun_before) / (sun + GLARE_WIDTH);
@@ -160,7 +161,7 @@ fn validate(@builtin(global_invocation_id) id: vec3u) {
     // Three clouded cells outvote one: where a fourth of them is not as predicted, nothing of the history is kept.
     let clouded = past.source != UNSEEN && min(ray.a, past.predicted.a) < CLEAR;
     if clouded {
-        atomicAdd(&ray_count, select(0xffffffffu, 3u, error > tolerance()));
+        atomicAdd(&ray_count, select(0xffffffffu, 3u, error > tolerance(past)));
     }
     cells[index].gain = gain;
     cells[index].error = select(error, UNKNOWN, past.source == UNSEEN);
@@ -264,17 +265,17 @@ fn read_cell(at: vec2i) -> Cell {
     let wraps = CAMERA == EQUIRECT && !SPARSE;
     let outside = vec4<bool>(at.y == 0, at.y == last.y, at.x == 0 && !wraps, at.x == last.x && !wraps);
     cell.contrast = select(cell.contrast, vec4f(UNKNOWN), outside.xxyy | outside.zwzw);
-    cell.tolerance = tolerance();
+    cell.tolerance = tolerance(cell.past);
     return cell;
 }
 
 // Contrast up to which a history is followed, and, below it, up to which there is interpolation.
-fn tolerance() -> f32 {
-    return clamp(quality.contrast, LEAST_TOLERANCE, MOST_TOLERANCE) * narrowness();
+fn tolerance(past: CellPast) -> f32 {
+    return clamp(quality.contrast, LEAST_TOLERANCE, MOST_TOLERANCE) * narrowness(past);
 }
 
-fn narrowness() -> f32 {
-    return min(WIDEST / (f32(STRIDE) * f32(spacing()) * pixel_width()), 1.0);
+fn narrowness(past: CellPast) -> f32 {
+    return min(WIDEST / (f32(STRIDE) * past.width), 1.0);
 }
 
 struct PastRow {
@@ -404,7 +405,7 @@ fn fill(cell: Cell, place: vec2i, old: vec4f, alone: bool) {
     let depth = history_depth[pixel_index(shifted)];
     let error = select(quarter(cell.error, place), quarter(cell.own_error, place), length == ROUND);
     let contrast = quarter(cell.contrast, place);
-    let least = INTERPOLATED * quality.contrast * narrowness();
+    let least = INTERPOLATED * quality.contrast * narrowness(cell.past);
     let alike = contrast <= least;
     let ghost = alike && error > max(GHOST * contrast, LEAST_GHOST);
     let seen = was_known(shifted) && is_finite4(old);
@@ -444,7 +445,7 @@ fn parallax(cell: Cell, depth: f32) -> f32 {
     let distances = vec2f(depth, cell.past.distance);
     let inverse = 1.0 / max(select(far, distances, distances >= vec2f(0.0)), vec2f(1.0));
     let way = length(frame.eye_motion - frame.cloud_motion);
-    return way * abs(inverse.x - inverse.y) / (pixel_width() * f32(spacing()));
+    return way * abs(inverse.x - inverse.y) / cell.past.width;
 }
 
 // Whether the scene has an edge among the pixels of a cell, the marched ones around it, and those of the past that are read.

@@ -19,7 +19,7 @@ fn sky_map_bake(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let direction = texel_direction(vec2f(id.xy), vec2f(size));
-    let radiance = min(frame.sky_scale * air_radiance(direction), vec3f(65504.0));
+    let radiance = min(frame.sky_scale * air_radiance(direction) / frame.sky_unit, vec3f(65504.0));
     textureStore(map_out, id.xy, vec4f(radiance, 1.0));
 }
 
@@ -46,7 +46,7 @@ fn sky_direction(azimuth: f32, elevation: f32) -> vec3f {
     return cos(elevation) * level + sin(elevation) * frame.zenith;
 }
 
-// Radiance of the air along a direction from the camera, up to the ground or to space, for a sun of irradiance 1.
+// Radiance of the air along a direction from the camera, up to the ground or to space, and of the night behind it.
 fn air_radiance(direction: vec3f) -> vec3f {
     let way = air_way(direction);
     if params.atmosphere.enabled == 0u || way.length <= 0.0 {
@@ -65,10 +65,11 @@ fn air_radiance(direction: vec3f) -> vec3f {
         let t = lowest + s * abs(s);
         light = air_step(light, direction, way.start + t.y, t.z - t.x);
     }
-    return light.radiance + select(exp(-light.depth) * NIGHT, vec3f(0.0), way.grounded);
+    let night = select(exp(-light.depth) * params.atmosphere.night, vec3f(0.0), way.grounded);
+    return params.sun.irradiance * light.radiance + night;
 }
 
-// Light and optical depth of the air up to some distance.
+// Light and optical depth of the air up to some distance, for a sun of irradiance 1.
 struct AirLight {
     radiance: vec3f,
     depth: vec3f,
@@ -88,7 +89,8 @@ fn air_step(before: AirLight, direction: vec3f, t: f32, step: f32) -> AirLight {
     return AirLight(radiance, before.depth + x);
 }
 
-// The share of the sky's radiance that comes from before a distance, by direction and by the root of that distance.
+// The share of the sky's radiance that comes from before a distance, by direction and by the root of that distance. The night is
+// behind all air.
 @compute @workgroup_size(8, 8)
 fn air_share_bake(@builtin(global_invocation_id) id: vec3u) {
     let size = textureDimensions(volume_out);
@@ -111,10 +113,10 @@ fn air_share_bake(@builtin(global_invocation_id) id: vec3u) {
             }
         }
     }
+    let night = select(exp(-light.depth) * params.atmosphere.night, vec3f(0.0), way.grounded);
+    let whole = params.sun.irradiance * light.radiance + night;
     for (var i = 0u; i < SLICES; i++) {
-        let x = f32(i) / f32(SLICES - 1u);
-        // In the dark it is the way that counts.
-        let share = select(vec3f(x * x), reached[i] / max(light.radiance, vec3f(1e-15)), light.radiance > vec3f(1e-12));
+        let share = select(vec3f(0.0), params.sun.irradiance * reached[i] / max(whole, vec3f(1e-30)), whole > vec3f(1e-20));
         textureStore(volume_out, vec3u(id.xy, i), vec4f(share, 1.0));
     }
 }
@@ -125,9 +127,8 @@ fn air_share_bake(@builtin(global_invocation_id) id: vec3u) {
 fn sky_light_bake() {
     let middle = 0.5 * (params.clouds.base + params.clouds.top);
     let mu = dot(frame.zenith, frame.sun_direction);
-    let air = select(vec3f(0.0), params.sun.irradiance, params.atmosphere.enabled > 0u);
-    sky_light[0] = vec4f(air * sky_from_above(middle, mu), 1.0);
-    sky_light[1] = vec4f(air * sky_from_below(middle, mu), 1.0);
+    sky_light[0] = vec4f(light_from_above(middle, mu), 1.0);
+    sky_light[1] = vec4f(light_from_below(middle, mu), 1.0);
     sky_light[2] = vec4f(sun_irradiance(middle, mu), 1.0);
     sky_light[3] = vec4f(sun_irradiance(params.high_clouds.altitude, mu), 1.0);
 }

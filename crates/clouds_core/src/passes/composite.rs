@@ -112,6 +112,21 @@ pub(crate) fn run_list(
     work.dispatch(&kernel, &bindings, [frame.active_rays, 1, 1])
 }
 
+/// Composes the pixels of the sheet of `frame` in which a disc of light is seen, anew.
+pub(crate) fn run_discs(
+    gpu: &Gpu,
+    work: &mut Work<'_>,
+    scene: &Scene<'_>,
+    frame: &Frame,
+    parts: &Parts<'_>,
+    layers: bool,
+) -> Result<()> {
+    let Parts { marched, out, .. } = parts;
+    let bindings = [scene.bindings.as_slice(), &marched.bindings(), &out.bindings()].concat();
+    let variant = Variant { discs: true, ..variant(scene.variant, frame, layers) };
+    work.dispatch(&*gpu.kernel("composite", "composite_discs", variant)?, &bindings, [frame.columns, frame.rows, 1])
+}
+
 /// Composes the band of `frame`; `layers` fills `sky` and `depth` too, which takes lavapipe a seventh of the time.
 pub(crate) fn run(
     gpu: &Gpu,
@@ -137,6 +152,7 @@ pub(crate) fn variant(of: Variant, frame: &Frame, layers: bool) -> Variant {
         cloudless: frame.cloudless > 0,
         ground_shadow: frame.ground_shadow > 0,
         layers,
+        wide: frame.sky_samples > 1,
         ..of
     }
 }

@@ -14,8 +14,8 @@ const SIZE: [u32; 3] = [128, 160, 1];
 /// Texels of the shares of the sky before a distance: azimuth, angle, distance (as in passes/sky.wgsl).
 const SHARE_SIZE: [u32; 3] = [32, 64, 24];
 
-/// What the sky is made from: sun, air, where it is seen from, and where the clouds are that it lights.
-type Key = (params::Sun, params::Atmosphere, [f64; 3], [f32; 3]);
+/// What the sky is made from: sun, air, night, where it is seen from, and where the clouds are that it lights.
+type Key = (params::Sun, params::Atmosphere, [f32; 3], [f64; 3], [f32; 3]);
 
 /// Where the sky is seen from, near the eye: the same place for all eyes around it, so that one that flies has a new sky
 /// every ten metres of height or hundreds of metres of way, not in every frame. What that costs: half of what a step changes,
@@ -62,8 +62,8 @@ impl Sky {
     ) -> Result<Bindings<'_>> {
         let layers = [params.clouds.base, params.clouds.top, params.high_clouds.altitude];
         let from = viewpoint(eye, params);
-        let key =
-            (params::Sun { visible: true, ..params.sun.clone() }, transmittance::air(params), from.to_array(), layers);
+        let sun = params::Sun { visible: true, ..params.sun.clone() };
+        let key = (sun, transmittance::air(params), params.atmosphere.night, from.to_array(), layers);
         let (map, share, light) = self.made.get(key, || {
             ctx.uniforms.upload_frame(ctx.gpu, &Frame::new(&Camera::equirect(from)?, params, 0.0, [1, 1]));
             let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());

@@ -32,7 +32,7 @@ impl Transmittance {
     }
 }
 
-/// What the air alone is made from: how much of it is seen between eye and clouds does not matter.
+/// What the air alone is made from: how much of it is seen between eye and clouds does not matter, nor the night behind it.
 pub(super) fn air(params: &Params) -> params::Atmosphere {
-    params::Atmosphere { aerial_perspective: 1.0, ..params.atmosphere.clone() }
+    params::Atmosphere { aerial_perspective: 1.0, night: [0.0; 3], ..params.atmosphere.clone() }
 }

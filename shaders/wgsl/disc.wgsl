@@ -1,0 +1,247 @@
+// The discs of sun and moon: the share of its light in each pixel, exact however wide pixels are. A point of the sky beside
+// its middle is a place in the plane that touches the sky there (a gnomonic projection, in which great circles are straight), in
+// radii of the disc. There a pixel is a polygon, and its share of a round disc follows from its edges alone (Green's theorem),
+// so that the shares of neighbours add up, whatever is rounded on the edge between them.
+#import math
+#import camera
+#import atmosphere
+#import aerial
+
+// Exponents of the cosine at the sun's surface by which its limb darkens, at 680, 550 and 440 nm (Hestroffer and Magnan
+// 1998, after Hillaire 2016).
+const LIMB = vec3f(0.397, 0.503, 0.652);
+
+struct Disc {
+    direction: vec3f,
+    radius: f32,
+    bounds: vec4f, // left, top, right and bottom of a part of the picture that holds it, pixels
+    irradiance: vec3f,
+    limb: vec3f,
+    bright: vec3f, // unit vector to its bright side
+    phase: f32, // cosine of the angle at it between its light and the eye: 1 is all lit
+}
+
+fn sun_disc() -> Disc {
+    return Disc(frame.sun_direction, SUN_RADIUS, frame.sun_bounds, params.sun.irradiance, LIMB, perpendicular(frame.sun_direction), 1.0);
+}
+
+// The moon's mean angular radius, 15.54 minutes of arc (as in moon.rs). A full one is as bright at its limb as in its middle.
+const MOON_RADIUS = 0.004520;
+
+fn moon_disc() -> Disc {
+    return Disc(frame.moon_direction, MOON_RADIUS, frame.moon_bounds, frame.moon_light, vec3f(0.0), frame.moon_bright, frame.moon_phase);
+}
+
+// Radiance that a pixel gets of the discs, on average, through the air.
+fn discs_in_pixel(pixel: vec2u) -> vec3f {
+    var light = vec3f(0.0);
+    if params.sun.visible > 0u {
+        light += disc_in_pixel(sun_disc(), vec2f(pixel));
+    }
+    light += disc_in_pixel(moon_disc(), vec2f(pixel));
+    // Beside a disc rounding may leave less than nothing.
+    return max(light, vec3f(0.0)) / pixel_solid_angle(vec2f(pixel));
+}
+
+// What a pixel gets of a disc: irradiance.
+fn disc_in_pixel(disc: Disc, corner: vec2f) -> vec3f {
+    // A panorama goes on beyond its sides.
+    let rounds = select(0, 1, CAMERA == EQUIRECT);
+    let plane = disc_plane(disc);
+    var share = vec3f(0.0);
+    for (var round = -rounds; round <= rounds; round++) {
+        let shift = vec2f(f32(round * i32(frame.width)), 0.0);
+        let low = max(corner + shift, disc.bounds.xy);
+        let high = min(corner + shift + 1.0, disc.bounds.zw);
+        if all(low < high) {
+            share += disc_in_part(disc, plane, low - shift, high - shift);
+        }
+    }
+    return disc.irradiance * share;
+}
+
+// The same as a share, of a part of a pixel that is no larger than the disc is: seen through the air in so many pieces, for it
+// dims the lower half of a disc at the horizon more than the upper.
+const PIECES_ACROSS = 5.0;
+
+fn disc_in_part(disc: Disc, plane: DiscPlane, low: vec2f, high: vec2f) -> vec3f {
+    let pieces = ceil(PIECES_ACROSS * saturate((high - low) / (disc.bounds.zw - disc.bounds.xy)));
+    let size = (high - low) / pieces;
+    var share = vec3f(0.0);
+    for (var y = 0.0; y < pieces.y; y += 1.0) {
+        for (var x = 0.0; x < pieces.x; x += 1.0) {
+            let from_corner = low + vec2f(x, y) * size;
+            let to_corner = select(from_corner + size, high, vec2f(x, y) + 1.0 == pieces);
+            let region = clipped(pixel_polygon(plane, from_corner, to_corner), vec2f(0.0, 1.0), plane.horizon);
+            let through = disc_transmittance(view_direction(0.5 * (from_corner + to_corner)).xyz);
+            if disc.phase < 1.0 {
+                share += through * lit_share(region, plane.bright, disc.phase);
+            } else {
+                share += through * polygon_share(region, 1.0 + 0.5 * disc.limb);
+            }
+        }
+    }
+    return share;
+}
+
+// Of the air, as if there were no ground: what it hides has been cut off.
+fn disc_transmittance(direction: vec3f) -> vec3f {
+    if !AIR {
+        return vec3f(1.0);
+    }
+    let way = air_way(direction);
+    let altitude = select(max(frame.altitude, 0.0), AIR_TOP, frame.power_air > 0.0);
+    let through = air_transmittance(altitude, cos_zenith_along(direction, way.start, altitude));
+    return select(vec3f(1.0), through, way.length > 0.0);
+}
+
+// The plane that touches the sky in the middle of a disc: its axes as local directions.
+struct DiscPlane {
+    middle: vec3f, // of the length of local directions (camera.wgsl)
+    toward: vec3f, // the same, one long
+    right: vec3f,
+    up: vec3f, // away from the ground
+    radius: f32,
+    bright: vec2f, // unit vector to the bright side
+    horizon: f32, // where the ground begins, radii up
+}
+
+fn disc_plane(disc: Disc) -> DiscPlane {
+    let sine = dot(disc.direction, frame.zenith);
+    let level = cross(disc.direction, frame.zenith);
+    let cosine = length(level);
+    let right = select(perpendicular(disc.direction), level / max(cosine, 1e-6), cosine > 1e-6);
+    let up = cross(right, disc.direction);
+    let toward = to_local(disc.direction);
+    let middle = select(toward, toward / max(toward.z, 1e-6), CAMERA != EQUIRECT && CAMERA != FISHEYE);
+    let horizon = -(sine + sin(frame.horizon_dip)) / max(cosine, 1e-6) / disc.radius;
+    let bright = vec2f(dot(disc.bright, right), dot(disc.bright, up));
+    return DiscPlane(middle, toward, to_local(right), to_local(up), disc.radius, bright, horizon);
+}
+
+fn to_local(direction: vec3f) -> vec3f {
+    return vec3f(dot(direction, frame.right), dot(direction, frame.up), dot(direction, frame.forward));
+}
+
+// Where in the plane the sky of a place in the picture is. The difference comes first, or narrow views lose their digits.
+fn disc_place(plane: DiscPlane, pixel: vec2f) -> vec2f {
+    let local = local_direction(pixel).xyz;
+    let beside = local - plane.middle;
+    return vec2f(dot(beside, plane.right), dot(beside, plane.up)) / (max(dot(local, plane.toward), 1e-3) * plane.radius);
+}
+
+// Edges of pixels are straight in the plane for a pinhole; a panorama's and a fisheye's are bent, and have so many corners a side.
+const CORNERS_A_SIDE = 3u;
+// With those that two cuts add.
+const MOST_CORNERS = 4u * CORNERS_A_SIDE + 4u;
+
+struct Polygon {
+    corners: array<vec2f, MOST_CORNERS>,
+    count: u32,
+}
+
+// A part of the picture as a polygon in the plane, counterclockwise.
+fn pixel_polygon(plane: DiscPlane, low: vec2f, high: vec2f) -> Polygon {
+    let a_side = select(1u, CORNERS_A_SIDE, CAMERA == EQUIRECT || CAMERA == FISHEYE);
+    var polygon: Polygon;
+    polygon.count = 4u * a_side;
+    for (var i = 0u; i < polygon.count; i++) {
+        let s = f32(i % a_side) / f32(a_side);
+        var at = vec2f(s, 1.0);
+        switch i / a_side {
+            case 0u: {}
+            case 1u: { at = vec2f(1.0, 1.0 - s); }
+            case 2u: { at = vec2f(1.0 - s, 0.0); }
+            default: { at = vec2f(0.0, s); }
+        }
+        // Written so that the ends are exact.
+        polygon.corners[i] = disc_place(plane, (1.0 - at) * low + at * high);
+    }
+    return polygon;
+}
+
+// What of a polygon lies beyond a line, on the side of its normal.
+fn clipped(given: Polygon, normal: vec2f, offset: f32) -> Polygon {
+    var polygon: Polygon;
+    polygon.count = 0u;
+    for (var i = 0u; i < given.count; i++) {
+        let a = given.corners[i];
+        let b = given.corners[(i + 1u) % given.count];
+        let beyond = vec2f(dot(normal, a), dot(normal, b)) - offset;
+        if beyond.x >= 0.0 {
+            polygon.corners[polygon.count] = a;
+            polygon.count += 1u;
+        }
+        if (beyond.x >= 0.0) != (beyond.y >= 0.0) && polygon.count < MOST_CORNERS {
+            polygon.corners[polygon.count] = a + (b - a) * (beyond.x / (beyond.x - beyond.y));
+            polygon.count += 1u;
+        }
+    }
+    return polygon;
+}
+
+// The share of the light of a disc in a polygon. It falls toward the limb as (1 - r^2)^(exponent - 1), so that 1 - (1 -
+// r^2)^exponent of it is within r, and the share is the integral of that over the angle around the middle, along the edges.
+fn polygon_share(polygon: Polygon, exponent: vec3f) -> vec3f {
+    // What lies beside the middle does not go round it, and then all of it may be left out, which is exact outside the disc.
+    var size = 0.0;
+    for (var i = 1u; i < polygon.count; i++) {
+        size = max(size, distance(polygon.corners[i], polygon.corners[0]));
+    }
+    let beside = size < 0.4 * length(polygon.corners[0]);
+    var sum = vec3f(0.0);
+    for (var i = 0u; i < polygon.count; i++) {
+        sum += edge_share(polygon.corners[i], polygon.corners[(i + 1u) % polygon.count], exponent, beside);
+    }
+    return sum / (2.0 * PI);
+}
+
+// The same of what is lit of a ball, on average as bright everywhere: the half of its disc toward the light, and beyond that, or
+// less, half an ellipse, which is a disc that is squeezed.
+fn lit_share(region: Polygon, bright: vec2f, phase: f32) -> f32 {
+    let half_disc = polygon_share(clipped(region, bright, 0.0), vec3f(1.0)).x;
+    var squeezed = clipped(region, select(bright, -bright, phase > 0.0), 0.0);
+    let narrow = max(abs(phase), 1e-3);
+    for (var i = 0u; i < squeezed.count; i++) {
+        let at = squeezed.corners[i];
+        squeezed.corners[i] = at + bright * (dot(at, bright) * (1.0 / narrow - 1.0));
+    }
+    let ellipse = phase * polygon_share(squeezed, vec3f(1.0)).x;
+    return (half_disc + ellipse) / max(0.5 * (1.0 + phase), 1e-4);
+}
+
+// Places and weights of Gauss and Legendre's rule with four points, from -1 to 1.
+const GAUSS_AT = vec4f(-0.8611363116, -0.3399810436, 0.3399810436, 0.8611363116);
+const GAUSS_WEIGHT = vec4f(0.3478548451, 0.6521451549, 0.6521451549, 0.3478548451);
+
+fn edge_share(a: vec2f, b: vec2f, exponent: vec3f, beside: bool) -> vec3f {
+    let long = distance(a, b);
+    if long <= 0.0 {
+        return vec3f(0.0);
+    }
+    let along = (b - a) / long;
+    let away = a.x * along.y - a.y * along.x;
+    // The part of it in the disc.
+    let half_chord = sqrt(max(1.0 - away * away, 0.0));
+    let s = clamp(vec2f(dot(a, along), dot(b, along)), vec2f(-half_chord), vec2f(half_chord));
+    let foot = away * vec2f(along.y, -along.x);
+    var sum = vec3f(0.0);
+    for (var i = 0u; i < 4u; i++) {
+        let at = mix(s.x, s.y, 0.5 + 0.5 * GAUSS_AT[i]);
+        let r2 = min(away * away + at * at, 1.0);
+        let outside = pow(vec3f(1.0 - r2), exponent);
+        // (1 - (1 - r^2)^exponent) / r^2 loses its digits in the middle.
+        let inside = select((1.0 - outside) / max(r2, 1e-2), exponent * (1.0 - 0.5 * (exponent - 1.0) * r2), r2 < 1e-2);
+        sum += GAUSS_WEIGHT[i] * select(inside, -outside / max(r2, 1e-12), beside);
+    }
+    sum *= 0.5 * (s.y - s.x) * away;
+    if !beside {
+        sum += turn(a, foot + s.x * along) + turn(foot + s.y * along, b);
+    }
+    return sum;
+}
+
+// The angle from one place to another around the middle.
+fn turn(a: vec2f, b: vec2f) -> f32 {
+    return atan2(a.x * b.y - a.y * b.x, dot(a, b) + 1e-20);
+}

@@ -12,7 +12,7 @@ export VIRTUAL_ENV := $(CURDIR)/$(VENV)
 unexport CONDA_PREFIX
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help setup build generate render gallery steps demo window test stress types lint bench bench-kernels heat profile soak packages clean
+.PHONY: help setup build generate render gallery steps demo window test stress types lint bench bench-kernels heat profile motion soak packages clean
 
 help: ## List the commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -118,6 +118,9 @@ heat: build $(VENV)/bench ## Count what each pixel costs into benchmarks/results
 
 profile: build $(VENV)/bench ## Time the passes of a frame, its reads and its memory into docs/speed.md
 	$(BIN)/python -m benchmarks.profile
+
+motion: build $(VENV)/bench ## Measure frames of animate against high into docs/accuracy.md (10 min on two cores)
+	$(BIN)/python -m benchmarks.motion
 
 soak: build $(VENV)/bench ## Render 10 000 animated frames and look for drift and growth
 	$(BIN)/python -m benchmarks.soak

@@ -41,6 +41,9 @@ def write(folder: Path, page: Path = PAGE) -> None:
         blocks["octaves"] = _octaves(octaves)
     if (oracle := _read(folder, "oracle.json")) is not None:
         blocks["oracle"] = _oracle(oracle)
+    if (motion := _read(folder, "motion.json")) is not None:
+        blocks["motion"] = _about(motion["header"]) + "\n\n" + _motion(motion["rows"])
+        blocks["motion"] += "\n\n" + _image(folder, page, "motion")
     if (soak := _read(folder, "soak.json")) is not None:
         blocks["soak"] = _soak(soak) + "\n\n" + _image(folder, page, "soak")
     page.write_text(_filled(text, blocks))
@@ -588,6 +591,19 @@ def _oracle(oracle: Row) -> str:
         + "\n\nThe path tracer over Mitsuba 3.9.1, and the z-scores of tiles of 8 × 8 pixels:\n\n"
         + _table(["case", "paths a pixel", "ratio of the means", "std of z", "largest z"], paths)
     )
+
+
+def _motion(rows: list[Row]) -> str:
+    motions = list(dict.fromkeys(row["motion"] for row in rows))
+
+    def cell(scene: str, motion: str, quality: str) -> str:
+        found = next(r for r in rows if (r["scene"], r["motion"], r["quality"]) == (scene, motion, quality))
+        dark = f", {found['dark']:.0f} dark" if found["dark"] else ""
+        return f"{_percent(found['frame'])} / {_percent(found['still'])}{dark}"
+
+    keys = dict.fromkeys((row["quality"], row["scene"]) for row in rows)
+    lines = [[f"`{s}`", f"`{q}`", *(cell(s, m, q) for m in motions)] for q, s in keys]
+    return _table(("scene", "quality", *motions), lines)
 
 
 def _soak(soak: Row) -> str:

@@ -187,7 +187,7 @@ DUSK = {
     "contrast": 0.0,
     "steps_zenith": 80,
     "steps_horizon": 192,
-    "light_steps": 96,
+    "light_steps": 72,
     "light_share": 0.0,
 }
 

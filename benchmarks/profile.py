@@ -53,7 +53,7 @@ def read_costs(repeats: int = 10) -> dict[str, float] | None:
         for _ in range(repeats + 1):
             call = f"vec4f({function}(x.xyz, u32(x.w)))"
             used = process_time()
-            renderer._core.probe(["read_cost"], call, points, params, 0.0)
+            renderer._core.probe(["read_cost"], call, points, params, (0.0, 0.0, 0.0), 0.0)
             used = 1000 * (process_time() - used)
             # What handing over the points takes is in the empty loop too.
             seen.append(used if software else renderer.timings.get("probe"))

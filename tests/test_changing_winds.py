@@ -306,7 +306,7 @@ def test_an_animation_of_keys_stays_near_the_still(renderer):
     *_, flown = make.animate(steady)
     expected = make.render(view(), keys.at(times[-1]), time=times[-1])
     usual = twin.relative_rmse(flown[..., :3], expected[..., :3])
-    assert twin.relative_rmse(last[..., :3], still[..., :3]) < 1.3 * usual
+    assert twin.relative_rmse(last[..., :3], still[..., :3]) < 1.3 * usual + 0.02
 
 
 def test_any_time_is_a_time_of_an_animation():

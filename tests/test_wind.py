@@ -43,9 +43,9 @@ def points_of(rng, params, n, reach, low=0.0, high=1.0):
 
 
 def moved(points, way, altitude, params):
-    """The points moved along the ground, at the same altitude."""
-    there = points + np.array([*way, 0.0])
-    return twin.raised(there, params.atmosphere.planet_radius, altitude)
+    """The points moved by a way on the chart, at the same altitude."""
+    radius = params.atmosphere.planet_radius
+    return twin.from_chart(twin.on_chart(points, radius) + np.asarray(way), radius, altitude)
 
 
 def rms(values):
@@ -62,8 +62,8 @@ def test_the_field_moves_by_the_wind(renderer, rng, time, wander):
     changes them. The way comes from f64, which keeps 1e-8 m of the 40,000 km of a month, and is
     wrapped by each noise's tile before it becomes f32: half of 2^-24 of a tile, 0.15 mm of the base
     shape and 2 mm of the weather map, which is the smoothest. Points reach the GPU in f32 relative
-    to the first, up to 30 km away: 1 mm at most. Measured: 0.05 to 0.2 mm, whatever the time. The
-    time alone, in f32, would have a month off by 2 m.
+    to the first, up to 30 km away, and from there onto the chart: a few mm. Measured: 1 to 3 mm,
+    whatever the time. The time alone, in f32, would have a month off by 2 m.
     """
     params = alike(72.0, 15.0, **wander)
     points, altitude = points_of(rng, params, 4000, 15_000)
@@ -76,7 +76,7 @@ def test_the_field_moves_by_the_wind(renderer, rng, time, wander):
     beside = renderer().density(moved(points, [0.5, 0.0], altitude, params), params, time=time)
     assert (now > 0).mean() > 0.05
     metres = rms(now - then) / (rms(beside - now) / 0.5)
-    assert metres < 0.001
+    assert metres < 0.004
 
 
 @pytest.mark.parametrize("wander", [{}, WANDER], ids=["steady", "wandering"])

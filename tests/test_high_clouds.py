@@ -471,7 +471,9 @@ def test_order(renderer, altitude, height, pitch):
     one side of it.
     """
     values = {"altitude": altitude, "optical_depth": 3.0, "coverage": 0.6, "type": 0.7}
-    params = high_params(values, **{"clouds.coverage": 0.6, "sun.elevation": 50.0})
+    # The clouds shade the ground, which lights the layer.
+    dark = {"atmosphere.ground_albedo": (0.0, 0.0, 0.0)}
+    params = high_params(values, **{"clouds.coverage": 0.6, "sun.elevation": 50.0} | dark)
     eye = np.array([0, 0, height])
     # From between the two rays meet both where they pass just over the ground.
     pitch, fov = (-1.9, 1.0) if 3200 < height < altitude else (pitch, 30.0)

@@ -123,7 +123,7 @@ def test_a_moving_spot_is_no_cut(renderer):
     """The frames of an animation follow it, near the stills."""
     camera = nubis.Camera.look_at((0, 0, 200), (0, 5000, 2000))
     shots = [
-        (camera, CLEAR.with_(**{"weather.clear_at": (20.0 * i, 6000.0)}), i / 24) for i in range(20)
+        (camera, CLEAR.with_(**{"weather.clear_at": (2.0 * i, 6000.0)}), i / 24) for i in range(20)
     ]
     make = renderer(96, 54)
     *_, last = make.animate(shots)

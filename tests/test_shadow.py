@@ -124,7 +124,7 @@ def test_no_sun_below_the_horizon(renderer, elevation):
         ({"extent": 0.0}, "extent = 0"),
         ({"extent": math.nan}, "extent = NaN"),
         ({"altitude": math.inf}, "altitude = inf"),
-        ({"center": (0.0, math.nan)}, "center[1] = nan"),
+        ({"center": (0.0, math.nan)}, r"center\[1\] = nan"),
         ({"center": 5.0}, "center = array of shape ()"),
         ({"center": ("a", "b")}, "center"),
         ({"time": math.inf}, "time = inf"),

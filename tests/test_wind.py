@@ -198,7 +198,8 @@ def test_the_updraft_raises_the_noises(renderer, rng, updraft):
     )
     points, altitude = points_of(rng, params, 3000, 8000, 0.20, 0.28)
     time = 1000.0 / abs(updraft)  # s: a kilometre
-    above = twin.raised(points, params.atmosphere.planet_radius, altitude + updraft * time)
+    radius = params.atmosphere.planet_radius
+    above = twin.from_chart(twin.on_chart(points, radius), radius, altitude + updraft * time)
     before = renderer().density(points, params)
     after = renderer().density(above, params, time=time)
     assert (before > 0).mean() > 0.05

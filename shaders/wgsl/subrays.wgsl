@@ -5,8 +5,6 @@
 #import shell
 #import lattice
 
-// Most rays through a pixel. Where it covers hundreds of clouds, the mean of 16 is off by a tenth of that between cloud and none.
-const MOST_RAYS = 16.0;
 // Clouds are this much narrower than the distance from one to the next (`leap_scale`).
 const CLOUD_WIDTH = 0.5;
 
@@ -16,7 +14,7 @@ fn rays_through(view: vec3f) -> f32 {
         return 1.0;
     }
     let width = cloud_stretches(view).start * pixel_width(view) * f32(spacing()) / (CLOUD_WIDTH * frame.leap_scale);
-    return clamp(ceil(width * width), 1.0, MOST_RAYS);
+    return clamp(ceil(width * width), 1.0, frame.most_rays);
 }
 
 // Where in its pixel, or in what stands for it where not all are known, a ray lies; one alone in the middle.

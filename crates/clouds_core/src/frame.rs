@@ -51,6 +51,8 @@ params! {
         /// 1 where eye, view, clouds or the user's scene have moved since the frame before.
         moving: u32 = 0;
 
+        /// Most rays through a pixel that is wider than clouds (subrays.wgsl).
+        most_rays: f32 = 1.0;
         /// Threads among which the device shares the workgroups of a dispatch, 1 unless it is a processor (workgroups.wgsl).
         threads: u32 = 1;
         /// Rays of the list in this dispatch (passes/march, passes/reference, passes/path).

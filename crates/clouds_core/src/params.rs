@@ -841,16 +841,26 @@ impl Quality {
         })
     }
 
-    /// Checks every value, and what no range can say.
-    pub fn check(&self) -> Result<()> {
-        check_block("quality", self)?;
-        // lavapipe ends loops without a word after 65,535 iterations summed over a shader (docs/numerics.md).
+    /// Most iterations of the loops of a ray. lavapipe ends loops without a word after 65,535 of them summed over a shader
+    /// (docs/numerics.md); a second deck, which gets a third more light samples (light.wgsl), stays below that from 40,000.
+    fn turns(&self) -> u32 {
         // Growing steps may be twice as many (passes/march.wgsl).
         let steps = self.steps_zenith.max(self.steps_horizon) * if self.step_growth > 0.0 { 2 } else { 1 };
         // What is lit as one has gathered more than its share; the rest of the ray is one more.
         let groups = (1.0 / self.light_share + 1.0).min(steps as f32) as u32;
-        // A second deck gets a third more light samples (light.wgsl).
-        let turns = 2 * steps + groups * (1 + self.light_steps + self.light_steps.div_ceil(3));
+        2 * steps + groups * (1 + self.light_steps)
+    }
+
+    /// Most rays through a pixel that is wider than clouds (subrays.wgsl): 16, of which the mean is off by a tenth of that between
+    /// cloud and none, or as many as lavapipe has iterations for, less those of a mean of the phase function.
+    pub(crate) fn most_rays(&self) -> f32 {
+        (48_000 / self.turns().max(1)).clamp(1, 16) as f32
+    }
+
+    /// Checks every value, and what no range can say.
+    pub fn check(&self) -> Result<()> {
+        check_block("quality", self)?;
+        let turns = self.turns();
         if turns > 40_000 {
             return Err(Error::parameter(
                 "quality.light_steps",

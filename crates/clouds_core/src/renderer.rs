@@ -908,7 +908,9 @@ impl Renderer {
         }
         self.timings = Timings::default();
         let params = params.at(time);
-        Ok((Frame::new(camera, &params, time, self.size), params))
+        let mut frame = Frame::new(camera, &params, time, self.size);
+        frame.most_rays = self.quality.most_rays();
+        Ok((frame, params))
     }
 }
 

@@ -70,8 +70,9 @@ fn march_pixel(pixel: vec2u, view: vec3f, within: vec2f) -> Cloud {
     let limit = scene_distance(pixel);
     let offset = ray_offset(pixel);
     let rays = rays_through(view);
+    let turned = seen_turn(view, vec2f(pixel));
     if !SUBRAYS {
-        return march_ray(view, pixel, limit, offset, within, rays);
+        return march_ray(view, turned, limit, offset, within, rays);
     }
     // Low-discrepancy sequences (R2, golden ratio) from where blue noise has it.
     let shift = vec2f(offset, ray_offset(pixel + vec2u(29u, 13u)));
@@ -82,7 +83,7 @@ fn march_pixel(pixel: vec2u, view: vec3f, within: vec2f) -> Cloud {
         let place = ray_place(pixel, fract(shift + k * vec2f(0.7548776662, 0.5698402910)), rays);
         let direction = view_direction(place).xyz;
         let known = select(EVERYWHERE, within, rays <= 1.0);
-        let cloud = march_ray(direction, pixel, limit, fract(offset + 0.6180339887 * k), known, rays);
+        let cloud = march_ray(direction, turned, limit, fract(offset + 0.6180339887 * k), known, rays);
         let weight = depth_weight(cloud.transmittance, cloud.depth);
         // Under a condition that differs by pixel: else lavapipe adds to those that are done what the others' next turn finds
         // (docs/numerics.md).
@@ -298,7 +299,7 @@ fn way_to_decks(direction: vec3f, leap: f32, at: Sample) -> f32 {
 // Steps for each that a big step leaps over: where those leap over none, nothing does.
 const LONGEST_LEAP = 16.0;
 
-fn march_ray(direction: vec3f, pixel: vec2u, limit: f32, offset: f32, within: vec2f, rays: f32) -> Cloud {
+fn march_ray(direction: vec3f, turned: Turn, limit: f32, offset: f32, within: vec2f, rays: f32) -> Cloud {
     let stretches = stretches_before(cloud_stretches(direction), limit);
     let length = stretches.first + stretches.second;
     // The optical depth is summed, not the transmittance multiplied: a thousand factors of almost 1 are all 1, or all
@@ -313,7 +314,6 @@ fn march_ray(direction: vec3f, pixel: vec2u, limit: f32, offset: f32, within: ve
     let sunlit = is_sunlit();
     let nodes = ray_nodes(stretches.start, stretch_distance(stretches, length) - stretches.start);
 
-    let turned = seen_turn(direction, vec2f(pixel));
     var sum = Gathered();
 
     let big = quality.big_step;

@@ -1,7 +1,7 @@
 """How far frames of `animate` are from the truth, beside stills of the same quality.
 
-Five scenes, five ways to move. Every frame that is looked at is compared with a picture in `high` of
-the same shot; so is a still of the frames' own quality. Nothing is drawn but marched clouds.
+Five scenes, five ways to move. Every frame that is looked at is compared with a picture in `high`
+of the same shot; so is a still of the frames' own quality.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ TRUTH = "high"
 
 
 def shots(scene: str, motion: str) -> Iterator[Shot]:
-    """Held at rest; forward at 5 m a frame; 5 degrees to the right; a minute; the sun by 0.25 degrees."""
+    """Held; forward at 5 m a frame; 5 degrees to the right; a minute; the sun by 0.25 degrees."""
     camera, params = nubis.scenes[scene]
     params = params.with_(**{"high_clouds.coverage": 0.0, "sun.visible": False})
     eye, forward = np.array(camera.eye), np.array(camera.forward)
@@ -48,7 +48,9 @@ def shots(scene: str, motion: str) -> Iterator[Shot]:
             at = eye + 5.0 * i * level
         elif motion == "turn":
             c, s = cos(radians(5.0 * i)), sin(radians(5.0 * i))
-            ahead = np.array((c * forward[0] + s * forward[1], c * forward[1] - s * forward[0], forward[2]))
+            ahead = np.array(
+                (c * forward[0] + s * forward[1], c * forward[1] - s * forward[0], forward[2])
+            )
         elif motion == "time lapse":
             time = 60.0 * i
         elif motion == "sun":
@@ -93,7 +95,7 @@ def row(size: Size, scene: str, motion: str, quality: str, strip: list[Picture])
 
 
 def run(size: Size, qualities: tuple[str, ...], plots: Path | None = None) -> list[Row]:
-    """All rows; with `plots`, the last three frames of every motion in `draft` as strips, motion.png."""
+    """All rows; with `plots`, the last three frames of every motion as strips, motion.png."""
     rows, strips = [], []
     work = [(s, m, q) for q in qualities for s in SCENES for m in MOTIONS]
     for scene, motion, quality in tqdm(work, unit="flight", disable=None):

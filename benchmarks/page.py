@@ -597,7 +597,9 @@ def _motion(rows: list[Row]) -> str:
     motions = list(dict.fromkeys(row["motion"] for row in rows))
 
     def cell(scene: str, motion: str, quality: str) -> str:
-        found = next(r for r in rows if (r["scene"], r["motion"], r["quality"]) == (scene, motion, quality))
+        found = next(
+            r for r in rows if (r["scene"], r["motion"], r["quality"]) == (scene, motion, quality)
+        )
         dark = f", {found['dark']:.0f} dark" if found["dark"] else ""
         return f"{_percent(found['frame'])} / {_percent(found['still'])}{dark}"
 

@@ -242,7 +242,7 @@ def test_the_sky_is_baked_every_so_often():
 
 
 def near(azimuth):
-    """A narrow view, whose cells are a degree wide: wider ones have to be as predicted to be followed."""
+    """A narrow view, whose cells are a degree wide: wider ones are followed less."""
     eye = np.array((0.0, 0.0, 300.0))
     return nubis.Camera.look_at(eye, eye + twin.compass(azimuth, 10), fov_y=15)
 

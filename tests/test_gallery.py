@@ -73,7 +73,9 @@ def test_lines_that_are_wrong():
     (one,) = gallery.pictures("\n\n" + LINES.replace("'above'", "'below'") + LINK)
     with pytest.raises(KeyError) as error:
         one.shot()
-    of_page = [entry.lineno + 1 for entry in error.traceback if str(entry.path).endswith("clouds.md")]
+    of_page = [
+        entry.lineno + 1 for entry in error.traceback if str(entry.path).endswith("clouds.md")
+    ]
     assert of_page == [4]
 
 

@@ -1,5 +1,5 @@
-"""Frames of `animate` against the stills of the same shots: the less differs between two frames, the
-nearer to their stills they are, and what a change makes invalid is not shown again.
+"""Frames of `animate` against the stills of the same shots: the less differs between two frames,
+the nearer to their stills they are, and what a change makes invalid is not shown again.
 """
 
 import numpy as np
@@ -117,7 +117,9 @@ JUMPS = {
 def test_a_jump_leaves_nothing_behind(jump):
     before = (look("fair_weather"), sky("fair_weather"), 0.0)
     after = (look("fair_weather"), sky("fair_weather", **JUMPS[jump]), 0.0)
-    frames = nubis.Renderer(*SIZE, quality="draft").animate([before] * 3 + [after] * 4, background=None)
+    frames = nubis.Renderer(*SIZE, quality="draft").animate(
+        [before] * 3 + [after] * 4, background=None
+    )
     truth = all_rays(after)
     bound = error(rendered(after), truth) + 0.05  # before: 0.46 to 1.7 in the first frame
     for frame in list(frames)[3:]:

@@ -240,8 +240,12 @@ impl Renderer {
             add("still", [marched.bindings(), refined.bindings(), composed.bindings(), backdrop.bindings()].concat());
             add("still", rays.as_ref().map_or(Vec::new(), |rays| rays.bindings("rays")));
         }
-        if let Some(Animation { refined, current, before, now, composed, backdrop, scene_before, .. }) = &self.animation {
-            add("animation", [current.bindings(), refined.bindings(), composed.bindings(), backdrop.bindings()].concat());
+        if let Some(Animation { refined, current, before, now, composed, backdrop, scene_before, .. }) = &self.animation
+        {
+            add(
+                "animation",
+                [current.bindings(), refined.bindings(), composed.bindings(), backdrop.bindings()].concat(),
+            );
             add("animation", vec![("scene_before", scene_before.depth())]);
             add("animation", [before.bindings(), now.bindings()].concat());
         }

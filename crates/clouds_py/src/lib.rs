@@ -776,7 +776,7 @@ mod _nubis {
     #[pymodule_export]
     use super::{
         Camera, DensityGrid, Renderer, adapters, auto_exposure, cache_usage, carried, carried_between, check,
-        check_params, check_quality, check_target, clear_cache, drift_after, drift_of, driver_settings, number, quality,
-        read_pixels, same_winds, to_srgb8, write_bytes, write_exr, write_hdr, write_png,
+        check_params, check_quality, check_target, clear_cache, drift_after, drift_of, driver_settings, number,
+        quality, read_pixels, same_winds, to_srgb8, write_bytes, write_exr, write_hdr, write_png,
     };
 }

@@ -135,7 +135,7 @@ pub(crate) fn validate(
     let bindings = [scene.bindings.as_slice(), &ours].concat();
     for entry in ["predict", "validate"] {
         let kernel = gpu.kernel("reproject", entry, scene.variant)?;
-        work.dispatch(&*kernel, &bindings, [frame.march_width, frame.sheet_rows, 1])?;
+        work.dispatch(&kernel, &bindings, [frame.march_width, frame.sheet_rows, 1])?;
     }
     Ok(())
 }

@@ -114,8 +114,8 @@ fn what_is_interrupted_leaves_nothing_behind() {
 
 #[test]
 fn an_animation_goes_on_in_another_size() {
-    goes_on("draft", [96, 56], "draft", [192, 112]);
-    goes_on("draft", [192, 112], "draft", [144, 84]);
+    goes_on("draft", [480, 280], "draft", [640, 374]);
+    goes_on("draft", [640, 374], "draft", [480, 280]);
 }
 
 /// `preview` follows one in sixteen of the larger pictures' pixels, as they are narrow, and each of the smaller ones'.

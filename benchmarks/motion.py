@@ -117,7 +117,8 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=RESULTS / "motion.json")
     args = parser.parse_args()
     width, height = (int(n) for n in args.size.split("x"))
-    header = measure.header(["benchmarks.motion", "--size", args.size]) | {"size": (width, height)}
+    command = ["benchmarks.motion", "--size", args.size, "--qualities", *args.qualities]
+    header = measure.header(command) | {"size": (width, height)}
     plots = args.out.parent / "plots"
     plots.mkdir(parents=True, exist_ok=True)
     rows = run((width, height), tuple(args.qualities), plots)

@@ -607,10 +607,13 @@ def test_a_path_that_is_cut_saw_the_background():
 
 
 def test_a_sun_of_any_strength():
-    """The sky was kept in half floats, which end at 65,504."""
+    """The sky was kept in half floats, which end at 65,504. The light of the night is not the
+    sun's, so it is off.
+    """
     camera, make = look_up_at_clouds(), renderer((8, 6), DRAFT)
+    dark = {"atmosphere.night": (0.0, 0.0, 0.0)}
     pictures = [
-        make.render(camera, Params().with_(**{"sun.irradiance": (e, e, e)})) / e
+        make.render(camera, Params().with_(**{"sun.irradiance": (e, e, e)}, **dark)) / e
         for e in (1e-6, 1.0, 1e6)
     ]
     for picture in pictures:

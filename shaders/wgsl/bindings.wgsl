@@ -11,7 +11,6 @@ override CAMERA: u32 = 0u; // the projection, see camera.wgsl
 override PRECISE: bool = false; // that grid is read by loads and in f32, not filtered by the hardware in half floats
 override AIR: bool = true; // there is air
 override SUNLIT: bool = true; // the sun can reach the clouds
-override SUN_VOLUME: bool = false; // light from beyond the light samples is read from the sun volume
 override RAINY: bool = true; // it may rain: cumulonimbus grow
 override RAIN_SHAFTS: bool = true; // rain is seen below the clouds
 override UPPER: bool = true; // there is a second deck
@@ -55,7 +54,6 @@ override LIGHT_CHEAP: bool = true; // there are light samples that do not
 @group(0) @binding(30) var volume: texture_3d<f32>; // the user's grid, 1 at its largest extinction, in half floats
 @group(0) @binding(31) var volume_exact: texture_3d<f32>; // the same in f32, which cannot be filtered everywhere
 @group(0) @binding(32) var majorants: texture_3d<f32>; // what the density nearby never exceeds (passes/majorant)
-@group(0) @binding(40) var sun_volume: texture_3d<f32>; // exp(-rate * optical depth to the sun) (passes/sun_volume)
 
 // The user's scene, a texel for each pixel of the sheet, row after row (scene_depth.wgsl).
 @group(0) @binding(70) var scene_depth: texture_2d<f32>; // m along the ray

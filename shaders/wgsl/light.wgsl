@@ -4,7 +4,6 @@
 #import droplets
 #import shell
 #import density
-#import sun_volume
 #import ambient
 #import aerial
 #import camera
@@ -52,14 +51,8 @@ fn optical_depth_to_sun(p: vec3f, opacity: f32, width: f32) -> f32 {
         }
     }
     depth *= frame.extinction;
-    if SUN_VOLUME {
-        depth += sun_volume_depth(p + samples.reach * frame.sun_direction, level_at(p.xy));
-    }
     return depth;
 }
-
-// Cells of the sun volume that are sampled live: it does not know what is nearer.
-const NEAR_CELLS = 2.0;
 
 // Where the samples lie: by squares over a given reach (the stretch of the k-th of n begins at (k / n)^2 of it), or to the
 // end of the clouds, where log(1 + distance / NEAR) grows in equal steps.
@@ -76,9 +69,6 @@ const NEAR = 150.0;
 
 fn light_samples(p: vec3f) -> LightSamples {
     let n = quality.light_steps;
-    if SUN_VOLUME {
-        return LightSamples(NEAR_CELLS * level_cell(level_at(p.xy)), 0.0, n, vec2f(0.0), n);
-    }
     if quality.light_distance > 0.0 {
         return LightSamples(quality.light_distance, 0.0, n, vec2f(0.0), n);
     }

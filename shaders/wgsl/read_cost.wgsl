@@ -71,11 +71,3 @@ fn reads_of_detail_noise(start: vec3f, count: u32) -> f32 {
     }
     return dot(sum, vec4f(1.0));
 }
-
-fn reads_of_sun_volume(start: vec3f, count: u32) -> f32 {
-    var sum = vec4f(0.0);
-    for (var i = 0u; i < count; i++) {
-        sum += textureSampleLevel(sun_volume, clamp_sampler, read_at(start, i, 96.0), 0.0);
-    }
-    return dot(sum, vec4f(1.0));
-}

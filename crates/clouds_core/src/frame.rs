@@ -10,7 +10,7 @@ use crate::camera::{Camera, Projection};
 use crate::moon::MOON_RADIUS;
 use crate::params;
 use crate::params::{Edge, Model, Params, Phase};
-use crate::passes::{broad_weather, refine, shadow, sun_volume};
+use crate::passes::{broad_weather, refine, shadow};
 use crate::wind::Carried;
 
 params! {
@@ -171,11 +171,6 @@ params! {
         /// Of the fit of cloud droplets (droplets.wgsl): g of its Henyey-Greenstein lobe, g and alpha of Draine's, and the
         /// share of that.
         droplet: [f32; 4] = [0.0; 4];
-
-        /// Where the eye is in the sun volume, after the wind, m from its middle (sun_volume.wgsl).
-        sun_volume_eye: [f32; 2] = [0.0; 2];
-        /// Cells of that between the lowest and the highest clouds.
-        sun_volume_rows: u32 = 1;
 
         /// By what the sky map is multiplied (atmosphere.wgsl).
         sky_scale: f32 = 1024.0;
@@ -423,8 +418,6 @@ impl Frame {
         frame.set_wind(camera.eye, params, time);
         frame.set_volume(camera.eye, params);
         frame.leap_scale = leap_scale(params);
-        frame.sun_volume_rows = sun_volume::rows(params);
-        frame.sun_volume_eye = sun_volume::eye_in(camera.eye, params, time);
         frame.shadow_texel = shadow::texel(frame.altitude);
         frame.shadow_eye = shadow::eye_in(camera.eye, params, time);
         frame.high_clouds = u32::from(params.has_high_clouds());

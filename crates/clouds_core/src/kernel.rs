@@ -71,8 +71,6 @@ pub(crate) struct Variant {
     pub air: bool,
     /// Whether the sun can reach the clouds.
     pub sunlit: bool,
-    /// Whether light is read from the sun volume.
-    pub sun_volume: bool,
     /// Whether it may rain.
     pub rainy: bool,
     /// Whether rain is seen.
@@ -131,7 +129,6 @@ impl Variant {
             precise: quality.tolerance > 0.0 || model == Model::Path,
             air: params.atmosphere.enabled,
             sunlit: true,
-            sun_volume: quality.sun_volume && params.volume.is_none(),
             rainy: params.is_rainy(),
             rain_shafts: params.has_rain_shafts(),
             upper: params.has_upper_clouds(),
@@ -144,7 +141,7 @@ impl Variant {
             light_detail: quality.cheap_light > 0.0,
             light_cheap: quality.cheap_light < 1.0
                 || quality.far_sample
-                || (quality.light_distance <= 0.0 && !quality.sun_volume),
+                || quality.light_distance <= 0.0,
             // What single passes ask for beside.
             camera: 0,
             high: false,
@@ -179,7 +176,7 @@ impl Variant {
         }
     }
 
-    fn constants(self) -> [(&'static str, f64); 31] {
+    fn constants(self) -> [(&'static str, f64); 30] {
         let switch = |on| f64::from(u8::from(on));
         [
             ("MODEL", f64::from(self.model as u32)),
@@ -189,7 +186,6 @@ impl Variant {
             ("PRECISE", switch(self.precise)),
             ("AIR", switch(self.air)),
             ("SUNLIT", switch(self.sunlit)),
-            ("SUN_VOLUME", switch(self.sun_volume)),
             ("RAINY", switch(self.rainy)),
             ("RAIN_SHAFTS", switch(self.rain_shafts)),
             ("UPPER", switch(self.upper)),

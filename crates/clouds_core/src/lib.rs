@@ -6,6 +6,7 @@
 mod blue_noise;
 pub mod cache;
 pub mod camera;
+mod clipmap;
 pub mod color;
 pub mod error;
 pub mod files;

@@ -412,9 +412,6 @@ params! {
         /// Share of a pixel's cloud that is lit as one, by the light samples of one place in it: samples in a row are lit
         /// together once they have gathered more. 0 lights each sample by itself.
         light_share: f32 = 0.15, in 0..=1 "";
-        /// Whether the light samples stay within two cells of a volume, baked around the eye, of sunlight through the clouds,
-        /// and the rest is read there. Not in a grid.
-        sun_volume: bool = false;
         /// How far the light samples reach; 0 spreads them to where the clouds end.
         light_distance: f32 = 0.0, in 0..=100000 "m";
         /// Whether there is one more light sample, at three times that reach, for shadows from distant clouds (nubis2015).

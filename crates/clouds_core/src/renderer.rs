@@ -32,7 +32,6 @@ use crate::passes::refine::{COARSEST, Refined};
 use crate::passes::reproject::{Current, Followed, History};
 use crate::passes::shadow::{self, GroundShadow};
 use crate::passes::sky::Sky;
-use crate::passes::sun_volume::SunVolume;
 use crate::passes::transmittance::Transmittance;
 use crate::passes::volume::Volume;
 use crate::passes::weather::Weather;
@@ -933,7 +932,6 @@ struct World {
     sky: Sky,
     volume: Volume,
     majorants: Majorants,
-    sun_volume: SunVolume,
     ground_shadow: GroundShadow,
     beams: Beams,
     scene_depth: SceneTextures,
@@ -990,7 +988,6 @@ impl World {
             sky: Sky::new(),
             volume: Volume::new(),
             majorants: Majorants::new(),
-            sun_volume: SunVolume::new(),
             ground_shadow: GroundShadow::new(),
             beams: Beams::new(),
             scene_depth: SceneTextures::new(gpu, 0, false),
@@ -1047,8 +1044,6 @@ impl World {
         .concat();
         let majorants = self.majorants.run(&mut ctx, params, &bindings)?; // when paths are traced
         bindings.extend(majorants);
-        let sun_volume = self.sun_volume.run(&mut ctx, params, frame, at, &bindings)?; // as clouds and eye move
-        bindings.extend(sun_volume);
         let ground_shadow = self.ground_shadow.run(&mut ctx, params, frame, at, &bindings)?; // as those, where it is seen
         bindings.extend(ground_shadow);
         let beams = self.beams.run(&mut ctx, params, frame, at, &bindings)?; // as those and the view, where they shade air

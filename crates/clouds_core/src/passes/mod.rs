@@ -19,7 +19,6 @@ pub mod refine;
 pub mod reproject;
 pub mod shadow;
 pub mod sky;
-pub mod sun_volume;
 pub mod transmittance;
 pub mod volume;
 pub mod weather;

@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 
-use super::sun_volume::{Origin, Shadows, shadows};
 use super::{Baked, Bindings, Context, Scene};
 use crate::camera::Camera;
+use crate::clipmap::{Casters, Origin, casters};
 use crate::error::Result;
 use crate::frame::Frame;
 use crate::gpu::Gpu;
@@ -29,13 +29,13 @@ const CLOUD_STEP: f64 = 32.0;
 
 /// What the shadows are made from: whether they are wanted, sun, clouds, weather, wind, planet and grid, and for where, how
 /// fine and when.
-pub(crate) type Key = (bool, Shadows, (f32, usize), [i64; 3], f32);
+pub(crate) type Key = (bool, Casters, (f32, usize), [i64; 3], f32);
 
 /// The same for a picture.
 pub(crate) fn key(params: &Params, frame: &Frame, (eye, time): (DVec3, f64)) -> Key {
     let grid = params.volume.as_ref().map_or(0, |grid| Arc::as_ptr(grid) as usize);
     let planet = (params.atmosphere.planet_radius, grid);
-    (wanted(frame), shadows(params), planet, origin(eye, params, time).steps, frame.shadow_texel)
+    (wanted(frame), casters(params), planet, origin(eye, params, time).steps, frame.shadow_texel)
 }
 
 /// The levels on the GPU.

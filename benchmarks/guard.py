@@ -33,6 +33,8 @@ Case = tuple[str, Callable[[], Any]]
 def checksum(value: Any) -> str:
     """Of an array, or of several by name."""
     digest = hashlib.sha256()
+    if isinstance(value, tuple):
+        value = dict(zip(map(str, range(len(value))), value, strict=True))
     arrays = value if isinstance(value, dict) else {"": value}
     for name in sorted(arrays):
         digest.update(name.encode() + np.ascontiguousarray(arrays[name]).tobytes())
@@ -161,12 +163,13 @@ def main() -> None:
             found[name] = checksum(make())
         except nubis.NubisError as error:
             found[name] = f"{type(error).__name__}: {error}"
-        if options.check and stored.get(name) != found[name]:
+        if options.store:
+            adapter = nubis.Renderer(8, 8).adapter
+            options.store.write_text(json.dumps({"adapter": str(adapter)} | found, indent=1) + "\n")
+        elif stored.get(name) != found[name]:
             changed.append(name)
             print(f"differs: {name}", flush=True)
     if options.store:
-        adapter = nubis.Renderer(8, 8).adapter
-        options.store.write_text(json.dumps({"adapter": str(adapter)} | found, indent=1) + "\n")
         print(f"{len(found)} stored")
     elif changed:
         sys.exit(f"{len(changed)} of {len(found)} differ")

@@ -4,7 +4,7 @@
 
 use std::time::Duration;
 
-use clouds_core::{Camera, Params, Quality, Renderer};
+use clouds_core::{Camera, Params, Quality, Renderer, Shot};
 use criterion::{BenchmarkGroup, Criterion, SamplingMode, measurement::WallTime};
 use glam::DVec3;
 
@@ -30,14 +30,14 @@ impl Scene {
     }
 
     fn still(&mut self) {
-        self.renderer.render(&self.camera, &self.params, self.time, true, false, None, &|| Ok(())).expect("renders");
+        self.renderer.render(&Shot::new(&self.camera, &self.params, self.time), false, &|| Ok(())).expect("renders");
     }
 
     /// The next frame of an animation in which clouds and camera move.
     fn animate(&mut self) {
         self.time += 1.0 / 24.0;
         self.camera.eye.y += 1.0;
-        self.renderer.animate(&self.camera, &self.params, self.time, true, None, &|| Ok(())).expect("renders");
+        self.renderer.animate(&Shot::new(&self.camera, &self.params, self.time), &|| Ok(())).expect("renders");
     }
 
     /// Asks for the density at one point, which bakes what is stale and marches nothing.

@@ -10,7 +10,11 @@ use crate::camera::{Camera, Projection};
 use crate::moon::MOON_RADIUS;
 use crate::params;
 use crate::params::{Edge, Model, Params, Phase};
-use crate::passes::{broad_weather, refine, shadow};
+use crate::gpu::Gpu;
+use crate::kernel::Binding;
+use crate::luts::{broad_weather, shadow};
+use crate::passes::refine;
+use crate::schema::{self, Block as _};
 use crate::wind::Carried;
 
 params! {
@@ -404,6 +408,13 @@ fn on_chart(at: DVec3, params: &Params) -> DVec2 {
 }
 
 impl Frame {
+    /// The uniform block.
+    pub(crate) fn block(&self, gpu: &Gpu) -> Binding {
+        let mut words = vec![0; schema::size(Self::FIELDS) / 4];
+        Self { threads: gpu.threads, ..self.clone() }.write(&mut words);
+        Binding::block(&words)
+    }
+
     /// What the camera and the size of a picture say of it.
     pub fn seen_by(camera: &Camera, [width, height]: [u32; 2]) -> Self {
         let mut frame = Self { width, height, rows: height, march_width: width, ..Self::default() };

@@ -1,9 +1,9 @@
 //! The GPU: finding an adapter, opening a device once per process, and waiting for it without hanging.
 
+use std::any::{Any, TypeId};
 use std::collections::HashMap;
 use std::ops::Range;
-use std::panic::resume_unwind;
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::thread;
@@ -11,8 +11,7 @@ use std::time::{Duration, Instant};
 
 use crate::cache::Pipelines;
 use crate::error::{Error, Result};
-use crate::kernel::{Binding, Kernel, Variant, Wanted};
-use crate::passes::noise::Noise;
+use crate::kernel::{Kernel, Key, Name, Program, Specialization};
 use crate::shader::{self, Linked};
 
 /// What an adapter says of itself.
@@ -30,6 +29,10 @@ pub struct AdapterInfo {
     pub pci: String,
 }
 
+/// Seconds that an invocation takes before any has been timed: of a march, on a processor and on a GPU.
+const FIRST_GUESS: [f64; 2] = [3e-6, 1e-8];
+/// Invocations up to which a dispatch says nothing of how long one takes: launching it takes longer.
+const TOO_FEW: f64 = 1024.0;
 /// How long one submission, meant to take a tenth of a second, may take before the device counts as hung.
 const HUNG: Duration = Duration::from_secs(300);
 /// How long to wait between looks at the caller's interrupt.
@@ -162,12 +165,19 @@ pub struct Gpu {
     pub(crate) repeat_sampler: wgpu::Sampler,
     pub(crate) clamp_sampler: wgpu::Sampler,
     pub(crate) mirror_sampler: wgpu::Sampler,
-    /// The last noise bake: renderers of the same seed share it.
-    pub(crate) noise: Mutex<Option<Arc<Noise>>>,
-    kernels: Mutex<HashMap<(String, Variant), Slot>>,
+    /// A flat texture and one with a depth, of a texel each, for what a kernel could read and does not.
+    pub(crate) nothing: [wgpu::TextureView; 2],
+    /// What renderers share, one of each type.
+    shared: Mutex<HashMap<TypeId, Arc<dyn Any + Send + Sync>>>,
+    programs: Mutex<HashMap<&'static str, Arc<Program>>>,
+    kernels: Mutex<HashMap<Key, Slot>>,
+    /// Seconds that an invocation takes, by kernel.
+    costs: Mutex<HashMap<String, f64>>,
+    submissions: AtomicU64,
+    waits: AtomicU64,
     /// What the driver has compiled.
     pub(crate) pipelines: Pipelines,
-    nanoseconds_per_tick: Option<f64>,
+    pub(crate) nanoseconds_per_tick: Option<f64>,
     failure: Arc<Mutex<Failure>>,
     waiting: mpsc::Sender<Waiting>,
 }
@@ -187,6 +197,21 @@ fn start_waiting(device: wgpu::Device) -> mpsc::Sender<Waiting> {
         }
     });
     sender
+}
+
+/// A texel of nothing.
+fn nothing(device: &wgpu::Device, dimension: wgpu::TextureDimension) -> wgpu::TextureView {
+    let texture = device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("nothing"),
+        size: wgpu::Extent3d { width: 1, height: 1, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension,
+        format: wgpu::TextureFormat::Rgba16Float,
+        usage: wgpu::TextureUsages::TEXTURE_BINDING,
+        view_formats: &[],
+    });
+    texture.create_view(&wgpu::TextureViewDescriptor::default())
 }
 
 /// A kernel that is there, or is being compiled by whoever holds the lock.
@@ -290,8 +315,13 @@ impl Gpu {
             clamp_sampler: sampler("clamp_sampler", wgpu::AddressMode::ClampToEdge),
             mirror_sampler: sampler("mirror_sampler", wgpu::AddressMode::MirrorRepeat),
             max_buffer: offered.max_storage_buffer_binding_size.min(offered.max_buffer_size),
-            noise: Mutex::new(None),
-            kernels: Mutex::new(HashMap::new()),
+            nothing: [wgpu::TextureDimension::D2, wgpu::TextureDimension::D3].map(|dimension| nothing(&device, dimension)),
+            shared: Mutex::default(),
+            programs: Mutex::default(),
+            kernels: Mutex::default(),
+            costs: Mutex::default(),
+            submissions: AtomicU64::new(0),
+            waits: AtomicU64::new(0),
             pipelines,
             nanoseconds_per_tick: (!timestamps.is_empty()).then(|| f64::from(queue.get_timestamp_period())),
             failure,
@@ -301,16 +331,73 @@ impl Gpu {
         })
     }
 
-    /// The kernel `entry` of `shaders/wgsl/passes/{pass}.wgsl`, compiled on first use.
-    pub(crate) fn kernel(&self, pass: &str, entry: &str, variant: Variant) -> Result<Arc<Kernel>> {
-        let slot = lock(&self.kernels).entry((entry.to_owned(), variant)).or_default().clone();
+    /// A pass, linked and validated on first use.
+    fn program(&self, pass: &'static str) -> Result<Arc<Program>> {
+        let known = lock(&self.programs).get(pass).cloned();
+        if let Some(program) = known {
+            return Ok(program);
+        }
+        let program = Arc::new(Program::new(self, pass)?);
+        Ok(lock(&self.programs).entry(pass).or_insert(program).clone())
+    }
+
+    fn slot(&self, name: Name, specialization: &Specialization) -> Result<(Arc<Program>, Slot)> {
+        let program = self.program(name.0)?;
+        let key = program.key(name, specialization)?;
+        let slot = lock(&self.kernels).entry(key).or_default().clone();
+        Ok((program, slot))
+    }
+
+    /// A kernel, compiled on first use.
+    pub(crate) fn kernel(&self, name: Name, specialization: &Specialization) -> Result<Arc<Kernel>> {
+        let (program, slot) = self.slot(name, specialization)?;
         let mut slot = lock(&slot);
         if let Some(kernel) = &*slot {
             return Ok(kernel.clone());
         }
-        let kernel = Arc::new(Kernel::new(self, pass, entry, variant)?);
+        let kernel = Arc::new(program.compile(self, name.1, specialization)?);
         *slot = Some(kernel.clone());
         Ok(kernel)
+    }
+
+    /// Whether a kernel is there already.
+    pub(crate) fn is_compiled(&self, name: Name, specialization: &Specialization) -> Result<bool> {
+        let (_, slot) = self.slot(name, specialization)?;
+        // One that is being compiled is locked.
+        Ok(slot.try_lock().is_ok_and(|slot| slot.is_some()))
+    }
+
+    /// What all renderers of the device share of a type.
+    pub(crate) fn common<T: Any + Send + Sync + Default>(&self) -> Arc<T> {
+        let mut shared = lock(&self.shared);
+        let slot = shared.entry(TypeId::of::<T>()).or_insert_with(|| Arc::new(T::default()));
+        slot.clone().downcast().expect("is kept by its type")
+    }
+
+    /// Seconds that an invocation of a kernel takes.
+    pub(crate) fn seconds_each(&self, kernel: &str) -> f64 {
+        let [processor, other] = FIRST_GUESS;
+        let guess = if self.info.kind == "cpu" { processor } else { other };
+        lock(&self.costs).get(kernel).copied().unwrap_or(guess)
+    }
+
+    /// How many invocations of a kernel take so many seconds, at least one.
+    pub(crate) fn most_invocations(&self, kernel: &str, seconds: f64) -> u64 {
+        ((seconds / self.seconds_each(kernel)) as u64).max(1)
+    }
+
+    /// Learns how long invocations of a kernel take: from many, and by no more than a factor of four at once.
+    pub(crate) fn learn(&self, kernel: &str, invocations: f64, seconds: f64) {
+        if invocations >= TOO_FEW && seconds > 0.0 {
+            let old = self.seconds_each(kernel);
+            let each = (seconds / invocations).clamp(old / 4.0, old * 4.0);
+            lock(&self.costs).insert(kernel.to_owned(), each);
+        }
+    }
+
+    /// How many submissions the device has had, and how often one was waited for.
+    pub fn counters(&self) -> [u64; 2] {
+        [&self.submissions, &self.waits].map(|counter| counter.load(Ordering::Relaxed))
     }
 
     /// Forgets what has been compiled, so that the shaders are read anew (`NUBIS_SHADERS`). Where one is broken all stays as it is,
@@ -319,27 +406,9 @@ impl Gpu {
         for name in shader::names() {
             Linked::new(name).and_then(|linked| linked.parse().map(drop)).map_err(Error::File)?;
         }
+        lock(&self.programs).clear();
         lock(&self.kernels).clear();
         Ok(())
-    }
-
-    /// Does `work` while `kernels` that it will ask for, each a pass and an entry, are compiled on other threads.
-    pub(crate) fn compiling<T>(&self, kernels: &[Wanted], work: impl FnOnce() -> Result<T>) -> Result<T> {
-        let compiled = |entry: &str, variant| {
-            let slot = lock(&self.kernels).get(&(entry.to_owned(), variant)).cloned();
-            slot.is_some_and(|slot| lock(&slot).is_some())
-        };
-        thread::scope(|scope| {
-            let missing = kernels.iter().filter(|(_, entry, variant)| !compiled(entry, *variant));
-            let threads: Vec<_> = missing
-                .map(|&(pass, entry, variant)| scope.spawn(move || self.kernel(pass, entry, variant).map(drop)))
-                .collect();
-            let done = work()?;
-            for thread in threads {
-                thread.join().unwrap_or_else(|panic| resume_unwind(panic))?;
-            }
-            Ok(done)
-        })
     }
 
     /// The first error since the last call, if any.
@@ -386,7 +455,22 @@ impl Gpu {
         })
     }
 
-    fn staging(&self, bytes: u64) -> wgpu::Buffer {
+    /// A buffer for the arguments of indirect dispatches, which are uniform blocks too.
+    pub(crate) fn arguments(&self, bytes: u64) -> wgpu::Buffer {
+        self.buffer_for("arguments", bytes, wgpu::BufferUsages::INDIRECT)
+    }
+
+    /// A buffer that timestamps are resolved into.
+    pub(crate) fn resolved(&self, bytes: u64) -> wgpu::Buffer {
+        self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("timestamps"),
+            size: bytes,
+            usage: wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC,
+            mapped_at_creation: false,
+        })
+    }
+
+    pub(crate) fn staging(&self, bytes: u64) -> wgpu::Buffer {
         self.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("staging"),
             size: bytes,
@@ -476,13 +560,15 @@ impl Gpu {
         }
     }
 
-    /// Starts recording work.
-    pub(crate) fn work(&self) -> Work<'_> {
-        let encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("work") });
-        Work { gpu: self, encoder, labels: Vec::new(), queries: Vec::new(), downloads: Vec::new() }
+    /// Hands commands over.
+    pub(crate) fn submit(&self, commands: wgpu::CommandEncoder) -> wgpu::SubmissionIndex {
+        self.submissions.fetch_add(1, Ordering::Relaxed);
+        self.queue.submit([commands.finish()])
     }
 
-    fn wait(&self, index: wgpu::SubmissionIndex, interrupt: Interrupt<'_>) -> Result<()> {
+    /// Waits for a submission and those before, or until `interrupt` fails.
+    pub(crate) fn wait(&self, index: wgpu::SubmissionIndex, interrupt: Interrupt<'_>) -> Result<()> {
+        self.waits.fetch_add(1, Ordering::Relaxed);
         let started = Instant::now();
         let (done, is_done) = mpsc::channel();
         let ended = || Error::Device("internal error, please report it".into());
@@ -523,127 +609,14 @@ impl Timings {
     }
 }
 
-/// Dispatches and downloads that are submitted together.
-pub(crate) struct Work<'a> {
-    gpu: &'a Gpu,
-    encoder: wgpu::CommandEncoder,
-    labels: Vec<String>,
-    queries: Vec<wgpu::QuerySet>,
-    downloads: Vec<Download>,
-}
-
-impl Work<'_> {
-    /// Runs a kernel over `extent` invocations (pixels, texels, points), with its variables bound by name.
-    pub fn dispatch(&mut self, kernel: &Kernel, bindings: &[(&str, Binding<'_>)], extent: [u32; 3]) -> Result<()> {
-        let group = kernel.bind(self.gpu, bindings)?;
-        let queries = self.gpu.nanoseconds_per_tick.map(|_| {
-            self.gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
-                label: Some("timestamps"),
-                ty: wgpu::QueryType::Timestamp,
-                count: 2,
-            })
-        });
-        let timestamp_writes = queries.as_ref().map(|query_set| wgpu::ComputePassTimestampWrites {
-            query_set,
-            beginning_of_pass_write_index: Some(0),
-            end_of_pass_write_index: Some(1),
-        });
-        {
-            let descriptor = wgpu::ComputePassDescriptor { label: Some(&kernel.label), timestamp_writes };
-            let mut pass = self.encoder.begin_compute_pass(&descriptor);
-            pass.set_pipeline(&kernel.pipeline);
-            pass.set_bind_group(0, &group, &[]);
-            let [x, y, z] = std::array::from_fn(|i| extent[i].div_ceil(kernel.workgroup[i]));
-            pass.dispatch_workgroups(x, y, z);
-        }
-        if let Some(queries) = queries {
-            self.labels.push(kernel.label.clone());
-            self.queries.push(queries);
-        }
-        Ok(())
-    }
-
-    /// Fills a buffer with zeros.
-    pub fn clear(&mut self, buffer: &wgpu::Buffer) {
-        self.encoder.clear_buffer(buffer, 0, None);
-    }
-
-    /// Fills a mip of a texture from a buffer, whose rows are padded to whole 256 bytes.
-    pub fn fill(&mut self, texture: &wgpu::Texture, mip_level: u32, buffer: &wgpu::Buffer) {
-        let Some((target, layout, size)) = mips(texture, COPIED).nth(mip_level as usize) else { return };
-        let layout = wgpu::TexelCopyBufferLayout { offset: 0, ..layout };
-        self.encoder.copy_buffer_to_texture(wgpu::TexelCopyBufferInfo { buffer, layout }, target, size);
-    }
-
-    /// Brings `bytes` of a buffer back; [`Work::submit`] returns them in the order of the calls.
-    pub fn download(&mut self, buffer: &wgpu::Buffer, offset: u64, bytes: u64) {
-        if buffer.usage().contains(wgpu::BufferUsages::MAP_READ) {
-            self.downloads.push(Download::of(buffer.clone(), offset..offset + bytes));
-            return;
-        }
-        let staging = self.gpu.staging(bytes);
-        self.encoder.copy_buffer_to_buffer(buffer, offset, &staging, 0, bytes);
-        self.downloads.push(Download::of(staging, 0..bytes));
-    }
-
-    /// The same for a texture of half floats and its mips, whose rows are padded.
-    pub fn download_texture(&mut self, texture: &wgpu::Texture) {
-        let bytes = texture_bytes(texture, COPIED);
-        let staging = self.gpu.staging(bytes);
-        for (source, layout, size) in mips(texture, COPIED) {
-            let target = wgpu::TexelCopyBufferInfo { buffer: &staging, layout };
-            self.encoder.copy_texture_to_buffer(source, target, size);
-        }
-        self.downloads.push(Download::of(staging, 0..bytes));
-    }
-
-    /// Runs everything, waits for it, adds to `timings` and returns the downloads.
-    pub fn submit(mut self, timings: &mut Timings, interrupt: Interrupt<'_>) -> Result<Vec<Download>> {
-        interrupt()?;
-        let gpu = self.gpu;
-        if !self.queries.is_empty() {
-            // Query results are resolved at multiples of 256 bytes.
-            let resolved = gpu.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("timestamps"),
-                size: 256 * self.queries.len() as u64,
-                usage: wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC,
-                mapped_at_creation: false,
-            });
-            for (i, queries) in self.queries.iter().enumerate() {
-                self.encoder.resolve_query_set(queries, 0..2, &resolved, 256 * i as u64);
-            }
-            let bytes = resolved.size();
-            self.download(&resolved, 0, bytes);
-        }
-        let index = gpu.queue.submit([self.encoder.finish()]);
-        let mut downloads = self.downloads;
-        for download in &mut downloads {
-            download.map();
-        }
-        gpu.wait(index, interrupt)?;
-        for Download { buffer, range, view, .. } in &mut downloads {
-            let found = buffer.get_mapped_range(range.clone());
-            *view = Some(found.map_err(|error| Error::Device(error.to_string()))?);
-        }
-        if let (Some(period), false) = (gpu.nanoseconds_per_tick, self.queries.is_empty()) {
-            let ticks = downloads.pop().expect("the timestamps were downloaded last");
-            for (i, label) in self.labels.iter().enumerate() {
-                let pair: &[u64] = &ticks.numbers()[32 * i..32 * i + 2];
-                timings.add(label, pair[1].saturating_sub(pair[0]) as f64 * period * 1e-6);
-            }
-        }
-        Ok(downloads)
-    }
-}
-
 /// Buffers that shaders write and we read.
 const IN_PLACE: wgpu::Features = wgpu::Features::MAPPABLE_PRIMARY_BUFFERS;
 
 /// What the rows of a texture that is copied to or from a buffer are padded to, bytes.
-const COPIED: u32 = wgpu::COPY_BYTES_PER_ROW_ALIGNMENT;
+pub(crate) const COPIED: u32 = wgpu::COPY_BYTES_PER_ROW_ALIGNMENT;
 
 /// The mips of a texture of half floats, and where their texels lie in memory, one mip after the other, their rows padded.
-fn mips(
+pub(crate) fn mips(
     texture: &wgpu::Texture,
     padded: u32,
 ) -> impl Iterator<Item = (wgpu::TexelCopyTextureInfo<'_>, wgpu::TexelCopyBufferLayout, wgpu::Extent3d)> {
@@ -690,14 +663,21 @@ pub(crate) struct Download {
 }
 
 impl Download {
-    fn of(buffer: wgpu::Buffer, range: Range<u64>) -> Self {
+    pub fn of(buffer: wgpu::Buffer, range: Range<u64>) -> Self {
         Self { buffer, range, mapped: false, view: None }
     }
 
     /// Asks for it; failures come out when it is there.
-    fn map(&mut self) {
+    pub fn map(&mut self) {
         self.buffer.map_async(wgpu::MapMode::Read, self.range.clone(), |_| {});
         self.mapped = true;
+    }
+
+    /// Opens what has come back.
+    pub fn open(&mut self) -> Result<()> {
+        let found = self.buffer.get_mapped_range(self.range.clone());
+        self.view = Some(found.map_err(|error| Error::Device(error.to_string()))?);
+        Ok(())
     }
 
     /// The bytes as numbers.

@@ -1,30 +1,49 @@
-//! A compute pipeline whose resources are bound by name: binding numbers and workgroup sizes stand in WGSL alone.
+//! A compute pipeline whose resources are bound by name: binding numbers and workgroup sizes stand in WGSL alone, and so does
+//! which `override` constants a kernel is compiled for.
 
 use std::borrow::Cow;
+use std::collections::{BTreeSet, HashMap};
+use std::ops::Range;
+use std::sync::Arc;
+
+use wgpu::naga::{AddressSpace, Block, Expression, Function, Handle, ImageDimension, Module, Override, Statement, TypeInner};
+use wgpu::naga::valid::ModuleInfo;
 
 use crate::error::{Error, Result};
-use crate::frame::Frame;
 use crate::gpu::Gpu;
-use crate::params::{Model, Params, Phase, Quality, WeatherNoise};
-use crate::passes::reproject;
 use crate::shader::Linked;
-use wgpu::naga::{AddressSpace, Module, valid::ModuleInfo};
+
+/// A pass, and an entry point of it.
+pub(crate) type Name = (&'static str, &'static str);
 
 /// Something that a kernel can be given for one of its variables.
-#[derive(Clone, Copy)]
-pub(crate) enum Binding<'a> {
-    Buffer(&'a wgpu::Buffer),
-    View(&'a wgpu::TextureView),
-    Sampler(&'a wgpu::Sampler),
+#[derive(Clone)]
+pub(crate) enum Binding {
+    Buffer(wgpu::Buffer),
+    View(wgpu::TextureView),
+    Sampler(wgpu::Sampler),
+    /// The words of a uniform block, which is put on the device with the recording.
+    Block(Arc<[u32]>),
+    /// Arguments of indirect dispatches, by number.
+    Arguments(Range<u32>),
 }
 
-impl Binding<'_> {
+/// Variables by name.
+pub(crate) type Bindings = Vec<(&'static str, Binding)>;
+
+impl Binding {
+    /// A uniform block.
+    pub fn block(words: &[u32]) -> Self {
+        Self::Block(words.into())
+    }
+
     /// Bytes of the buffer, or of the texture with its mips: what they hold, without what drivers pad.
-    pub fn bytes(self) -> u64 {
+    pub fn bytes(&self) -> u64 {
         let texture = match self {
             Self::Buffer(buffer) => return buffer.size(),
+            Self::Block(words) => return 4 * words.len() as u64,
             Self::View(view) => view.texture(),
-            Self::Sampler(_) => return 0,
+            Self::Sampler(_) | Self::Arguments(_) => return 0,
         };
         let texel = u64::from(texture.format().block_copy_size(None).unwrap_or(0));
         let texels = |mip| {
@@ -35,244 +54,133 @@ impl Binding<'_> {
     }
 }
 
-impl<'a> From<&'a wgpu::Buffer> for Binding<'a> {
-    fn from(buffer: &'a wgpu::Buffer) -> Self {
-        Self::Buffer(buffer)
+impl From<&wgpu::Buffer> for Binding {
+    fn from(buffer: &wgpu::Buffer) -> Self {
+        Self::Buffer(buffer.clone())
     }
 }
 
-impl<'a> From<&'a wgpu::TextureView> for Binding<'a> {
-    fn from(view: &'a wgpu::TextureView) -> Self {
-        Self::View(view)
+impl From<&wgpu::TextureView> for Binding {
+    fn from(view: &wgpu::TextureView) -> Self {
+        Self::View(view.clone())
     }
 }
 
-impl<'a> From<&'a wgpu::Sampler> for Binding<'a> {
-    fn from(sampler: &'a wgpu::Sampler) -> Self {
-        Self::Sampler(sampler)
+impl From<&wgpu::Sampler> for Binding {
+    fn from(sampler: &wgpu::Sampler) -> Self {
+        Self::Sampler(sampler.clone())
     }
 }
 
-/// What a pipeline is made for: the values of the `override` constants of `bindings.wgsl`. What a picture does not need is
-/// compiled out, not branched over.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(crate) struct Variant {
-    /// The light model.
-    pub model: Model,
-    /// The phase function of the clouds.
-    pub phase: Phase,
-    /// Whether the clouds are the user's grid.
-    pub volume: bool,
-    /// Whether that grid is read in f32.
-    pub precise: bool,
-    /// Whether there is a spot to keep clear.
-    pub keep_clear: bool,
-    /// Whether there is air.
-    pub air: bool,
-    /// Whether the sun can reach the clouds.
-    pub sunlit: bool,
-    /// Whether it may rain.
-    pub rainy: bool,
-    /// Whether rain is seen.
-    pub rain_shafts: bool,
-    /// Whether there is a second deck.
-    pub upper: bool,
-    /// Whether a larger map shifts the weather.
-    pub broad: bool,
-    /// Whether the profile by height is the user's table.
-    pub profile_table: bool,
-    /// Whether clouds cast shadows on the air.
-    pub beams: bool,
-    /// Whether there is a scene of the user's.
-    pub scene: bool,
-    /// Whether pixels may be wider than clouds.
-    pub subrays: bool,
-    /// Whether the clouds are known at the corners of cells of pixels alone.
-    pub sparse: bool,
-    /// Whether there are light samples that see the detail.
-    pub light_detail: bool,
-    /// Whether there are light samples that do not.
-    pub light_cheap: bool,
-    /// The projection of the camera, for kernels that know pixels.
-    pub camera: u32,
-    /// Whether there are high clouds, for `composite`.
-    pub high: bool,
-    /// Whether those are embossed, for `composite`.
-    pub high_emboss: bool,
-    /// Whether the sun is so low that each of those has its own sunlight, for `composite`.
-    pub high_low_sun: bool,
-    /// Whether nothing has been marched, for `composite`.
-    pub cloudless: bool,
-    /// Whether clouds cast shadows on the ground in sight, for `composite`.
-    pub ground_shadow: bool,
-    /// Whether the sky and the depth are asked for, for `composite`.
-    pub layers: bool,
-    /// Whether the sky varies within a pixel, for `composite`.
-    pub wide: bool,
-    /// Whether the pixels are those of a disc of light, for `composite`.
-    pub discs: bool,
-    /// Whether the phase function varies within a pixel.
-    pub wide_phase: bool,
-    /// Which noises a weather map is baked from, for `weather`.
-    pub weather_noise: WeatherNoise,
-}
+/// Values of `override` constants by name. A kernel is compiled for those of them that it reads: what a picture does not need
+/// is compiled out, not branched over.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Specialization(Vec<(&'static str, f64)>);
 
-impl Variant {
-    /// What a picture needs.
-    pub fn new(params: &Params, quality: &Quality) -> Self {
-        let model = params.light.model;
-        Self {
-            model,
-            phase: params.light.phase,
-            volume: params.volume.is_some(),
-            keep_clear: params.clear_spot().1 > 0.0 && params.volume.is_none(),
-            precise: quality.tolerance > 0.0 || model == Model::Path,
-            air: params.atmosphere.enabled,
-            sunlit: true,
-            rainy: params.is_rainy(),
-            rain_shafts: params.has_rain_shafts(),
-            upper: params.has_upper_clouds(),
-            broad: params.has_broad_weather(),
-            profile_table: params.clouds.profile.is_some() && params.volume.is_none(),
-            beams: false,
-            scene: false,
-            subrays: false,
-            sparse: false,
-            light_detail: quality.cheap_light > 0.0,
-            light_cheap: quality.cheap_light < 1.0
-                || quality.far_sample
-                || quality.light_distance <= 0.0,
-            // What single passes ask for beside.
-            camera: 0,
-            high: false,
-            high_emboss: false,
-            high_low_sun: false,
-            cloudless: false,
-            ground_shadow: false,
-            layers: false,
-            wide: false,
-            discs: false,
-            wide_phase: false,
-            weather_noise: WeatherNoise::WorleyPerlin,
+impl Specialization {
+    /// A table.
+    pub fn new(values: impl IntoIterator<Item = (&'static str, f64)>) -> Self {
+        Self(values.into_iter().collect())
+    }
+
+    /// The same with other values.
+    pub fn with(&self, values: &[(&'static str, f64)]) -> Arc<Self> {
+        let mut table = self.clone();
+        for (name, value) in values {
+            match table.0.iter_mut().find(|(known, _)| known == name) {
+                Some((_, old)) => *old = *value,
+                None => table.0.push((name, *value)),
+            }
         }
+        Arc::new(table)
     }
 
-    /// What a bake needs that knows no picture.
-    pub fn bake() -> Self {
-        Self::new(&Params::default(), &Quality::default())
+    /// The names of the constants.
+    pub fn names(&self) -> impl Iterator<Item = &'static str> {
+        self.0.iter().map(|(name, _)| *name)
     }
 
-    /// What a picture needs that is seen in a frame.
-    pub fn of_frame(params: &Params, quality: &Quality, frame: &Frame) -> Self {
-        Self {
-            sunlit: frame.sunlit(params),
-            camera: frame.camera_kind,
-            beams: frame.beams > 0,
-            scene: frame.scene > 0,
-            subrays: params.volume.is_none() && frame.has_subrays(),
-            sparse: frame.sparse > 0,
-            wide_phase: frame.phase_samples > 1,
-            ..Self::new(params, quality)
-        }
-    }
-
-    fn constants(self) -> [(&'static str, f64); 30] {
-        let switch = |on| f64::from(u8::from(on));
-        [
-            ("MODEL", f64::from(self.model as u32)),
-            ("PHASE", f64::from(self.phase as u32)),
-            ("VOLUME", switch(self.volume)),
-            ("KEEP_CLEAR", switch(self.keep_clear)),
-            ("PRECISE", switch(self.precise)),
-            ("AIR", switch(self.air)),
-            ("SUNLIT", switch(self.sunlit)),
-            ("RAINY", switch(self.rainy)),
-            ("RAIN_SHAFTS", switch(self.rain_shafts)),
-            ("UPPER", switch(self.upper)),
-            ("BROAD_WEATHER", switch(self.broad)),
-            ("PROFILE_TABLE", switch(self.profile_table)),
-            ("BEAMS", switch(self.beams)),
-            ("SCENE", switch(self.scene)),
-            ("SUBRAYS", switch(self.subrays)),
-            ("SPARSE", switch(self.sparse)),
-            ("STRIDE", f64::from(reproject::stride(self.sparse))),
-            ("LIGHT_DETAIL", switch(self.light_detail)),
-            ("LIGHT_CHEAP", switch(self.light_cheap)),
-            ("CAMERA", f64::from(self.camera)),
-            ("HIGH", switch(self.high)),
-            ("HIGH_EMBOSS", switch(self.high_emboss)),
-            ("HIGH_LOW_SUN", switch(self.high_low_sun)),
-            ("CLOUDLESS", switch(self.cloudless)),
-            ("GROUND_SHADOW", switch(self.ground_shadow)),
-            ("LAYERS", switch(self.layers)),
-            ("WIDE", switch(self.wide)),
-            ("DISCS", switch(self.discs)),
-            ("WIDE_PHASE", switch(self.wide_phase)),
-            ("WEATHER_NOISE", f64::from(self.weather_noise as u32)),
-        ]
+    fn get(&self, name: &str) -> Option<f64> {
+        self.0.iter().find(|(known, _)| *known == name).map(|(_, value)| *value)
     }
 }
 
-/// A kernel of a pass, and what it is made for.
-pub(crate) type Wanted = (&'static str, &'static str, Variant);
-
-/// A compute pipeline and the variables that it uses.
-pub struct Kernel {
-    /// Name in timings, benches and GPU debuggers.
-    pub label: String,
-    pub(crate) workgroup: [u32; 3],
-    pub(crate) pipeline: wgpu::ComputePipeline,
-    layout: wgpu::BindGroupLayout,
-    variables: Vec<(String, u32)>,
+/// A pass: its module on the device, and its entry points.
+pub(crate) struct Program {
+    shader: wgpu::ShaderModule,
+    entries: HashMap<String, Entry>,
 }
 
-/// The variables that an entry point uses, with their binding numbers.
-fn used_variables(module: &Module, info: &ModuleInfo, entry: usize) -> Vec<(String, u32)> {
-    let uses = info.get_entry_point(entry);
-    let mut variables = Vec::new();
-    for (handle, variable) in module.global_variables.iter() {
-        if let (false, Some(binding), Some(name)) = (uses[handle].is_empty(), variable.binding, &variable.name)
-            && !matches!(variable.space, AddressSpace::WorkGroup | AddressSpace::Private)
-        {
-            variables.push((name.clone(), binding.binding));
-        }
-    }
-    variables
+/// What reflection says of an entry point.
+struct Entry {
+    workgroup: [u32; 3],
+    variables: Vec<Variable>,
+    /// The constants that it reads.
+    constants: Vec<String>,
 }
 
-impl Kernel {
-    /// Links, validates and compiles the kernel `entry` of a pass.
-    pub(crate) fn new(gpu: &Gpu, pass: &str, entry: &str, variant: Variant) -> Result<Self> {
+#[derive(Clone)]
+struct Variable {
+    name: String,
+    number: u32,
+    /// Of a texture.
+    dimension: Option<ImageDimension>,
+}
+
+/// Which kernel of a device: pass, entry and the values of the constants that it reads, by their bits.
+pub(crate) type Key = (String, String, Vec<Option<u64>>);
+
+impl Program {
+    /// Links and validates a pass.
+    pub fn new(gpu: &Gpu, pass: &str) -> Result<Self> {
         let linked = Linked::new(&format!("passes/{pass}")).map_err(Error::Device)?;
-        Self::from_linked(gpu, &linked, entry, variant)
+        Self::from_linked(gpu, &linked)
     }
 
-    #[expect(clippy::disallowed_methods, reason = "the one place that makes pipelines")]
-    pub(crate) fn from_linked(gpu: &Gpu, linked: &Linked, entry: &str, variant: Variant) -> Result<Self> {
+    /// The same of linked source.
+    #[expect(clippy::disallowed_methods, reason = "the one place that makes shader modules")]
+    pub fn from_linked(gpu: &Gpu, linked: &Linked) -> Result<Self> {
         let (module, info) = linked.parse().map_err(Error::Device)?;
-        let index = module
-            .entry_points
-            .iter()
-            .position(|point| point.name == entry)
-            .ok_or_else(|| Error::Device(format!("no kernel named {entry:?}")))?;
-        let workgroup = module.entry_points[index].workgroup_size;
-        let variables = used_variables(&module, &info, index);
-        let declared = |name: &str| module.overrides.iter().any(|(_, o)| o.name.as_deref() == Some(name));
-        let constants: Vec<_> = variant.constants().into_iter().filter(|(name, _)| declared(name)).collect();
-        let descriptor = wgpu::ShaderModuleDescriptor {
-            label: Some(entry),
-            // What has been parsed already, not the text.
-            source: wgpu::ShaderSource::Naga(Cow::Owned(module)),
-        };
+        let entries = module.entry_points.iter().enumerate().map(|(index, point)| {
+            let entry = Entry {
+                workgroup: point.workgroup_size,
+                variables: used_variables(&module, &info, index),
+                constants: used_constants(&module, &point.function),
+            };
+            (point.name.clone(), entry)
+        });
+        let entries = entries.collect();
+        // What has been parsed already, not the text.
+        let source = wgpu::ShaderSource::Naga(Cow::Owned(module));
+        let descriptor = wgpu::ShaderModuleDescriptor { label: None, source };
         let checks = wgpu::ShaderRuntimeChecks { force_loop_bounding: false, ..Default::default() };
         // SAFETY: only loop bounding is off, which costs a counter in every loop (ten times the time on some drivers,
         // gfx-rs/wgpu#7698). The shaders are this crate's own, and each of their loops ends. Bounds checks stay.
         let shader = unsafe { gpu.device.create_shader_module_trusted(descriptor, checks) };
+        Ok(Self { shader, entries })
+    }
+
+    fn entry(&self, name: &str) -> Result<&Entry> {
+        self.entries.get(name).ok_or_else(|| Error::Device(format!("no kernel named {name:?}")))
+    }
+
+    /// Which kernel a table asks for.
+    pub fn key(&self, (pass, entry): (&str, &str), specialization: &Specialization) -> Result<Key> {
+        let values = self.entry(entry)?.constants.iter().map(|name| specialization.get(name).map(f64::to_bits));
+        Ok((pass.to_owned(), entry.to_owned(), values.collect()))
+    }
+
+    /// Compiles an entry point.
+    #[expect(clippy::disallowed_methods, reason = "the one place that makes pipelines")]
+    pub fn compile(&self, gpu: &Gpu, name: &str, specialization: &Specialization) -> Result<Kernel> {
+        let entry = self.entry(name)?;
+        let names = entry.constants.iter().map(String::as_str);
+        let constants: Vec<_> = names.filter_map(|name| Some((name, specialization.get(name)?))).collect();
         let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some(entry),
+            label: Some(name),
             layout: None,
-            module: &shader,
-            entry_point: Some(entry),
+            module: &self.shader,
+            entry_point: Some(name),
             compilation_options: wgpu::PipelineCompilationOptions {
                 zero_initialize_workgroup_memory: false,
                 constants: &constants,
@@ -281,21 +189,136 @@ impl Kernel {
         });
         let layout = pipeline.get_bind_group_layout(0);
         gpu.check()?;
-        Ok(Self { label: entry.to_owned(), workgroup, pipeline, layout, variables })
+        let (workgroup, variables) = (entry.workgroup, entry.variables.clone());
+        Ok(Kernel { label: name.to_owned(), workgroup, pipeline, layout, variables })
     }
+}
 
-    /// A bind group with each used variable's resource. Samplers that are not given bind themselves.
-    pub(crate) fn bind(&self, gpu: &Gpu, bindings: &[(&str, Binding<'_>)]) -> Result<wgpu::BindGroup> {
+/// The constants that a function and those that it calls read.
+fn used_constants(module: &Module, function: &Function) -> Vec<String> {
+    let mut seen = BTreeSet::new();
+    let mut found = Vec::new();
+    let mut functions = vec![function];
+    while let Some(function) = functions.pop() {
+        let read = function.expressions.iter().filter_map(|(_, expression)| override_of(expression));
+        found.extend(read);
+        called(&function.body, &mut |handle| {
+            if seen.insert(handle) {
+                functions.push(&module.functions[handle]);
+            }
+        });
+    }
+    // A constant may be worked out from others.
+    let mut names = BTreeSet::new();
+    while let Some(handle) = found.pop() {
+        let constant = &module.overrides[handle];
+        if names.insert(constant.name.clone().unwrap_or_default())
+            && let Some(init) = constant.init
+        {
+            let mut expressions = vec![init];
+            while let Some(expression) = expressions.pop() {
+                match &module.global_expressions[expression] {
+                    Expression::Unary { expr, .. } | Expression::As { expr, .. } => expressions.push(*expr),
+                    Expression::Binary { left, right, .. } => expressions.extend([*left, *right]),
+                    other => found.extend(override_of(other)),
+                }
+            }
+        }
+    }
+    names.into_iter().collect()
+}
+
+fn override_of(expression: &Expression) -> Option<Handle<Override>> {
+    match expression {
+        Expression::Override(handle) => Some(*handle),
+        _ => None,
+    }
+}
+
+/// Tells `tell` of each call in a block.
+fn called(block: &Block, tell: &mut impl FnMut(Handle<Function>)) {
+    for statement in block {
+        match statement {
+            Statement::Call { function, .. } => tell(*function),
+            Statement::Block(inner) => called(inner, tell),
+            Statement::If { accept, reject, .. } => [accept, reject].into_iter().for_each(|block| called(block, tell)),
+            Statement::Switch { cases, .. } => cases.iter().for_each(|case| called(&case.body, tell)),
+            Statement::Loop { body, continuing, .. } => {
+                [body, continuing].into_iter().for_each(|block| called(block, tell));
+            }
+            _ => {}
+        }
+    }
+}
+
+/// The variables that an entry point uses.
+fn used_variables(module: &Module, info: &ModuleInfo, entry: usize) -> Vec<Variable> {
+    let uses = info.get_entry_point(entry);
+    let mut variables = Vec::new();
+    for (handle, variable) in module.global_variables.iter() {
+        if let (false, Some(binding), Some(name)) = (uses[handle].is_empty(), variable.binding, &variable.name)
+            && !matches!(variable.space, AddressSpace::WorkGroup | AddressSpace::Private)
+        {
+            let dimension = match module.types[variable.ty].inner {
+                TypeInner::Image { dim, .. } => Some(dim),
+                _ => None,
+            };
+            variables.push(Variable { name: name.clone(), number: binding.binding, dimension });
+        }
+    }
+    variables
+}
+
+/// A compute pipeline and the variables that it uses.
+pub struct Kernel {
+    /// Name in timings, benches and GPU debuggers.
+    pub label: String,
+    pub(crate) workgroup: [u32; 3],
+    pub(crate) pipeline: wgpu::ComputePipeline,
+    layout: wgpu::BindGroupLayout,
+    variables: Vec<Variable>,
+}
+
+/// Where the blocks and the arguments of a recording lie on the device.
+pub(crate) struct Resources<'a> {
+    pub blocks: &'a wgpu::Buffer,
+    pub offsets: &'a HashMap<*const u32, u64>,
+    pub arguments: &'a wgpu::Buffer,
+    /// Bytes from one set of arguments to the next.
+    pub stride: u64,
+}
+
+impl Kernel {
+    /// A bind group with each used variable's resource: the first of its name. Samplers that are not given bind themselves, and a
+    /// texture that is not given, which a kernel could read and does not, is one texel.
+    pub(crate) fn bind(
+        &self,
+        gpu: &Gpu,
+        bindings: &[(&'static str, Binding)],
+        resources: &Resources<'_>,
+    ) -> Result<wgpu::BindGroup> {
         let mut entries = Vec::new();
-        for (name, number) in &self.variables {
-            let given = bindings.iter().find(|(given, _)| given == name).map(|(_, binding)| *binding);
-            let resource = match (given, name.as_str()) {
-                (Some(Binding::Buffer(buffer)), _) => buffer.as_entire_binding(),
-                (Some(Binding::View(view)), _) => wgpu::BindingResource::TextureView(view),
-                (Some(Binding::Sampler(sampler)), _) => wgpu::BindingResource::Sampler(sampler),
-                (None, "repeat_sampler") => wgpu::BindingResource::Sampler(&gpu.repeat_sampler),
-                (None, "clamp_sampler") => wgpu::BindingResource::Sampler(&gpu.clamp_sampler),
-                (None, _) => return Err(Error::Device(format!("{}: nothing bound to {name}", self.label))),
+        for Variable { name, number, dimension } in &self.variables {
+            let given = bindings.iter().find(|(given, _)| given == name).map(|(_, binding)| binding);
+            let part = |buffer, offset, size| {
+                wgpu::BindingResource::Buffer(wgpu::BufferBinding { buffer, offset, size: std::num::NonZero::new(size) })
+            };
+            let resource = match (given, name.as_str(), dimension) {
+                (Some(Binding::Buffer(buffer)), ..) => buffer.as_entire_binding(),
+                (Some(Binding::View(view)), ..) => wgpu::BindingResource::TextureView(view),
+                (Some(Binding::Sampler(sampler)), ..) => wgpu::BindingResource::Sampler(sampler),
+                (Some(Binding::Block(words)), ..) => {
+                    part(resources.blocks, resources.offsets[&words.as_ptr()], 4 * words.len() as u64)
+                }
+                (Some(Binding::Arguments(range)), ..) => {
+                    let stride = resources.stride;
+                    part(resources.arguments, stride * u64::from(range.start), stride * range.len() as u64)
+                }
+                (None, "repeat_sampler", _) => wgpu::BindingResource::Sampler(&gpu.repeat_sampler),
+                (None, "clamp_sampler", _) => wgpu::BindingResource::Sampler(&gpu.clamp_sampler),
+                (None, _, Some(ImageDimension::D3)) => wgpu::BindingResource::TextureView(&gpu.nothing[1]),
+                (None, _, Some(_)) => wgpu::BindingResource::TextureView(&gpu.nothing[0]),
+                (None, ..) => return Err(Error::Device(format!("{}: nothing bound to {name}", self.label))),
             };
             entries.push(wgpu::BindGroupEntry { binding: *number, resource });
         }

@@ -848,6 +848,11 @@ impl Quality {
         2 * steps + groups * (1 + self.light_steps)
     }
 
+    /// Whether the user's grid is read in f32, and not filtered by the hardware in half floats.
+    pub(crate) fn is_precise(&self, params: &Params) -> bool {
+        self.tolerance > 0.0 || params.light.model == Model::Path
+    }
+
     /// Most rays through a pixel that is wider than clouds (subrays.wgsl): 16, of which the mean is off by a tenth of that between
     /// cloud and none, or as many as lavapipe has iterations for, less those of a mean of the phase function.
     pub(crate) fn most_rays(&self) -> f32 {

@@ -4,8 +4,7 @@ use std::ops::Range;
 
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
-use crate::kernel::Binding;
-use crate::passes::Bindings;
+use crate::kernel::{Binding, Bindings};
 
 /// Farthest distance of a scene, m: what is beyond it counts as sky, as infinity does. Five times the diameter of the
 /// largest planet. Rasterizers call the sky 1e10 and more, or the largest f32.
@@ -82,11 +81,11 @@ impl SceneTextures {
         }
     }
 
-    pub fn depth(&self) -> Binding<'_> {
+    pub fn depth(&self) -> Binding {
         (&self.views[0]).into()
     }
 
-    pub fn bindings(&self) -> Bindings<'_> {
+    pub fn bindings(&self) -> Bindings {
         vec![("scene_depth", self.depth()), ("scene_color", (&self.views[1]).into())]
     }
 }

@@ -12,7 +12,7 @@ use clouds_core::gpu::Timings;
 use clouds_core::params::Weather;
 use clouds_core::renderer::Picture;
 use clouds_core::schema::Map;
-use clouds_core::{Camera, Error, Gpu, Params, Quality, Renderer, Result, Screen, color, files};
+use clouds_core::{Camera, Error, Gpu, Params, Quality, Renderer, Result, Screen, Shot, color, files};
 
 use crate::resolution::Resolution;
 use crate::sight::{Sight, error_pixels, history_pixels, pixels_of};
@@ -323,16 +323,16 @@ impl<'a> Work<'a> {
         let screen = self.screen(wish, size)?;
         self.moving.set(size[0], size[1], quality)?;
         if wish.sight == Sight::History {
-            self.moving.animate(camera, params, *time, true, None, &interrupt)?;
+            self.moving.animate(&Shot::new(camera, params, *time), &interrupt)?;
             screen.write_pixels(self.gpu, &history_pixels(&self.moving.history_length()?, size))?;
         } else if let Some(folder) = &wish.record {
-            let image = self.moving.animate(camera, params, *time, true, None, &interrupt)?;
+            let image = self.moving.animate(&Shot::new(camera, params, *time), &interrupt)?;
             screen.write(self.gpu, &image)?;
             let path = folder.join(format!("frame{:05}.png", self.count));
             let pixels = color::to_srgb8(&image, 4, size[0] as usize, wish.exposure, wish.tone_map, true)?;
             files::write_png(&path, &pixels, size.map(|side| side as usize), 4)?;
         } else {
-            self.moving.animate_onto(&screen, camera, params, *time, &interrupt)?;
+            self.moving.animate_onto(&screen, &Shot::new(camera, params, *time), &interrupt)?;
         }
         Ok(Made { screen, beside: None, still: None, metered: None, timings: self.moving.timings.clone() })
     }
@@ -348,7 +348,7 @@ impl<'a> Work<'a> {
         let Wish { camera, time, .. } = wish;
         let mut still = |size: [u32; 2], params: &Params, quality: &Quality, layers: bool| {
             self.still.set(size[0], size[1], quality.clone())?;
-            self.still.render(camera, params, *time, !layers, layers, None, interrupt)
+            self.still.render(&Shot { background: !layers, ..Shot::new(camera, params, *time) }, layers, interrupt)
         };
         // The truth takes its time.
         let size = if wish.sight == Sight::Error { size.map(|side| (side / TRUTH_SHARE).max(1)) } else { size };
@@ -406,7 +406,7 @@ impl<'a> Work<'a> {
         let [width, height] = PANORAMA;
         self.still.set(width, height, wish.quality.clone())?;
         let camera = Camera::equirect(wish.camera.eye)?;
-        let image = self.still.render(&camera, &wish.params, wish.time, true, false, None, &interrupt)?.image;
+        let image = self.still.render(&Shot::new(&camera, &wish.params, wish.time), false, &interrupt)?.image;
         let size = PANORAMA.map(|side| side as usize);
         files::write_exr(&path, &image, size, 4)?;
         let pixels = color::to_srgb8(&image, 4, size[0], wish.exposure, wish.tone_map, true)?;

@@ -6,7 +6,7 @@ use std::cell::Cell;
 use std::sync::Arc;
 
 use clouds_core::color::{TONE_MAPS, to_srgb8};
-use clouds_core::{Camera, Error, Gpu, Params, Quality, Renderer, Screen};
+use clouds_core::{Camera, Error, Gpu, Params, Quality, Renderer, Screen, Shot};
 use clouds_demo::preset;
 use glam::DVec3;
 
@@ -36,8 +36,8 @@ fn a_screen_shows_what_memory_gets() {
         let screen = Screen::new(&gpu, [64, 40], exposure, tone_map).expect("is made");
         for i in 0..3 {
             let (camera, params, time) = shot(i);
-            one.animate_onto(&screen, &camera, &params, time, &|| Ok(())).expect("is painted");
-            let image = other.animate(&camera, &params, time, true, None, &|| Ok(())).expect("is made");
+            one.animate_onto(&screen, &Shot::new(&camera, &params, time), &|| Ok(())).expect("is painted");
+            let image = other.animate(&Shot::new(&camera, &params, time), &|| Ok(())).expect("is made");
             let expected = to_srgb8(&image, 4, 64, exposure, tone_map, true).expect("is shown");
             let got = read::bytes(&gpu, &screen);
             let most = got.iter().zip(&expected).map(|(a, b)| a.abs_diff(*b)).max();
@@ -52,7 +52,7 @@ fn screens_of_another_size_are_refused() {
     let mut renderer = renderer(64, 40);
     let screen = Screen::new(&renderer.gpu().clone(), [64, 41], 0.0, "agx").expect("is made");
     let (camera, params, time) = shot(0);
-    let error = renderer.animate_onto(&screen, &camera, &params, time, &|| Ok(())).expect_err("does not fit");
+    let error = renderer.animate_onto(&screen, &Shot::new(&camera, &params, time), &|| Ok(())).expect_err("does not fit");
     assert!(error.to_string().contains("64 x 41"), "{error}");
     assert!(Screen::new(renderer.gpu(), [64, 40], 0.0, "best").is_err());
 }
@@ -97,12 +97,12 @@ fn what_is_interrupted_leaves_nothing_behind() {
             if left.get() < 0 { Err(Error::Interrupted) } else { Ok(()) }
         };
         let (camera, params, time) = shot(0);
-        let interrupted = renderer.animate(&camera, &params, time, true, None, &interrupt).is_err();
+        let interrupted = renderer.animate(&Shot::new(&camera, &params, time), &interrupt).is_err();
         // The first frame after it is a still.
         renderer.cut();
-        let image = renderer.animate(&camera, &params, time, true, None, &|| Ok(())).expect("is made");
+        let image = renderer.animate(&Shot::new(&camera, &params, time), &|| Ok(())).expect("is made");
         let expected = expected
-            .get_or_insert_with(|| other.animate(&camera, &params, time, true, None, &|| Ok(())).expect("is made"));
+            .get_or_insert_with(|| other.animate(&Shot::new(&camera, &params, time), &|| Ok(())).expect("is made"));
         assert!(image == *expected, "interrupted after {patience} questions");
         renderer.cut();
         if !interrupted {
@@ -130,7 +130,7 @@ fn an_animation_goes_on_with_other_pixels_known() {
 fn goes_on(first: &str, [w, h]: [u32; 2], then: &str, [width, height]: [u32; 2]) {
     let make = |renderer: &mut Renderer, i| {
         let (camera, params, time) = shot(i);
-        renderer.animate(&camera, &params, time, true, None, &|| Ok(())).expect("is made")
+        renderer.animate(&Shot::new(&camera, &params, time), &|| Ok(())).expect("is made")
     };
     let mut animated = renderer_by(first, w, h);
     for i in 0..17 {

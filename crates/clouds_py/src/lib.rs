@@ -12,6 +12,7 @@ use clouds_core::camera::{Camera as CoreCamera, Convention, Projection};
 use clouds_core::gpu::{self, lock};
 use clouds_core::params::{Params, Quality};
 use clouds_core::renderer::Renderer as CoreRenderer;
+use clouds_core::Shot;
 use clouds_core::scene_depth::SceneDepth;
 use clouds_core::schema::Value;
 use clouds_core::wind::{Between, Carried, NUMBERS};
@@ -423,9 +424,8 @@ impl Renderer {
         let _inside = exit::enter(py);
         let params: Params = params_from_python(params)?;
         let scene = scene_from_python(scene_depth.as_ref(), scene_color.as_ref())?;
-        let picture = detached(py, |interrupt| {
-            lock(&self.core).render(&camera.0, &params, time, background, false, scene, interrupt)
-        })?;
+        let shot = Shot { camera: &camera.0, params: &params, time, background, scene };
+        let picture = detached(py, |interrupt| lock(&self.core).render(&shot, false, interrupt))?;
         array(py, picture.image, &self.shape(&[4]))
     }
 
@@ -440,8 +440,8 @@ impl Renderer {
         let _inside = exit::enter(py);
         let params: Params = params_from_python(params)?;
         let scene = scene_from_python(scene_depth.as_ref(), None)?;
-        let picture =
-            detached(py, |interrupt| lock(&self.core).render(&camera.0, &params, time, false, true, scene, interrupt))?;
+        let shot = Shot { camera: &camera.0, params: &params, time, background: false, scene };
+        let picture = detached(py, |interrupt| lock(&self.core).render(&shot, true, interrupt))?;
         let image = array(py, picture.image, &self.shape(&[4]))?;
         let sky = array(py, picture.sky, &self.shape(&[4]))?;
         let depth = array(py, picture.depth, &self.shape(&[]))?;
@@ -467,8 +467,8 @@ impl Renderer {
         let _inside = exit::enter(py);
         let params: Params = params_from_python(params)?;
         let scene = scene_from_python(scene_depth.as_ref(), scene_color.as_ref())?;
-        let image =
-            detached(py, |interrupt| lock(&self.core).animate(&camera.0, &params, time, background, scene, interrupt))?;
+        let shot = Shot { camera: &camera.0, params: &params, time, background, scene };
+        let image = detached(py, |interrupt| lock(&self.core).animate(&shot, interrupt))?;
         array(py, image, &self.shape(&[4]))
     }
 
@@ -540,7 +540,7 @@ impl Renderer {
         let _inside = exit::enter(py);
         let params: Params = params_from_python(params)?;
         let map = detached(py, |interrupt| {
-            lock(&self.core).shadow_map(&params, time, center, altitude, extent, size, interrupt)
+            lock(&self.core).shadow_map(&params, time, [center[0], center[1], altitude], (extent, size), interrupt)
         })?;
         array(py, map, &[size as usize, size as usize])
     }
@@ -570,6 +570,11 @@ impl Renderer {
         })?;
         let count = answers.len();
         array(py, answers.into_flattened(), &[count, 4])
+    }
+
+    /// Submissions to the device so far, and how often one was waited for.
+    fn counters(&self, py: Python<'_>) -> [u64; 2] {
+        unlocked(py, || lock(&self.core).gpu().counters())
     }
 
     fn timings(&self, py: Python<'_>) -> Vec<(String, f64)> {

@@ -421,10 +421,10 @@ fn nearest_scene(first: vec2u) -> f32 {
 // The pixels of the cells of the list.
 @compute @workgroup_size(64)
 fn composite_list(@builtin(global_invocation_id) id: vec3u) {
-    if id.x >= frame.active_rays {
+    let number = frame.first_ray + id.x;
+    if number >= listed.w {
         return;
     }
-    let number = frame.first_ray + id.x;
     let cell = active_rays[number / (TILE * TILE)];
     let i = number % (TILE * TILE);
     let pixel = TILE * vec2u(cell % cell_columns(), cell / cell_columns()) + vec2u(i % TILE, i / TILE);

@@ -28,11 +28,11 @@ fn march_list(
     @builtin(num_workgroups) groups: vec3u,
     @builtin(local_invocation_id) local: vec3u,
 ) {
-    let number = 64u * spread(group.x, groups.x) + local.x;
-    if number >= frame.active_rays {
+    let number = frame.first_ray + 64u * spread(group.x, groups.x) + local.x;
+    if number >= listed.w {
         return;
     }
-    let index = active_rays[frame.first_ray + number];
+    let index = active_rays[number];
     let known = select(EVERYWHERE, cloud_span[index], frame.spans > 0u);
     cloud_span[index] = march_cell(index, known);
 }

@@ -9,6 +9,21 @@
 #import lattice
 #import scene_depth
 
+// Lists the pixels of the lattice.
+@compute @workgroup_size(8, 8)
+fn list_lattice(@builtin(global_invocation_id) id: vec3u) {
+    let last = vec2u(frame.march_width, frame.sheet_rows) - 1u;
+    let size = (last + frame.lattice - 1u) / frame.lattice + 1u;
+    if any(id.xy >= size) {
+        return;
+    }
+    let pixel = min(id.xy * frame.lattice, last);
+    active_rays[id.y * size.x + id.x] = pixel.y * frame.march_width + pixel.x;
+    if all(id.xy == vec2u(0u)) {
+        atomicStore(&ray_count, size.x * size.y);
+    }
+}
+
 @compute @workgroup_size(8, 8)
 fn refine(@builtin(global_invocation_id) id: vec3u) {
     let last = vec2u(frame.march_width, frame.sheet_rows) - 1u;

@@ -164,7 +164,7 @@ fn validate(@builtin(global_invocation_id) id: vec3u) {
     // Three clouded cells outvote one: where a fourth of them is not as predicted, nothing of the history is kept.
     let clouded = past.source != UNSEEN && min(ray.a, past.predicted.a) < CLEAR;
     if clouded {
-        atomicAdd(&ray_count, select(0xffffffffu, 3u, error > tolerance(past)));
+        atomicAdd(&votes, select(-1, 3, error > tolerance(past)));
     }
     cells[index].gain = gain;
     cells[index].error = select(max(error, past.glare), UNKNOWN, past.source == UNSEEN);
@@ -328,6 +328,16 @@ fn limited(cubic: vec4f, linear: vec4f, above: HistoryRow, below: HistoryRow, x:
     let room = select(low, high, beyond > vec4f(0.0));
     let share = select(vec4f(1.0), room / beyond, abs(beyond) > abs(room));
     return linear + min(min(share.x, share.y), min(share.z, share.w)) * beyond;
+}
+
+// Whether the frame is a still: where most rays are not what the history says, or where more pixels are listed than a still marches.
+// The list is empty then.
+@compute @workgroup_size(1)
+fn choose() {
+    is_still = select(0u, 1u, atomicLoad(&votes) > 0 || f32(atomicLoad(&ray_count)) > most_listed.x);
+    if is_still != 0u {
+        atomicStore(&ray_count, 0u);
+    }
 }
 
 // A still as the history of the frames after it. Its coarsest lattice has had rays of their own; between those it is interpolated,

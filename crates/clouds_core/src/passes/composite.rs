@@ -2,12 +2,11 @@
 
 use super::march::Marched;
 use super::refine::{COARSEST, Refined, WIDEST};
-use super::{Bindings, Scene};
-use crate::error::Result;
 use crate::frame::Frame;
-use crate::gpu::{Gpu, Work};
-use crate::kernel::Variant;
-use crate::params::Quality;
+use crate::gpu::Gpu;
+use crate::kernel::Bindings;
+use crate::params::{Params, Quality};
+use crate::recorder::Recorder;
 
 /// Pixels of a cell in each direction (as in lattice.wgsl).
 pub(crate) const TILE: u32 = COARSEST;
@@ -39,7 +38,7 @@ impl Composed {
         }
     }
 
-    pub fn bindings(&self) -> Bindings<'_> {
+    pub fn bindings(&self) -> Bindings {
         vec![("image", (&self.image).into()), ("sky", (&self.sky).into()), ("depth", (&self.depth).into())]
     }
 }
@@ -54,7 +53,7 @@ impl Backdrop {
         Self { corners: gpu.buffer("corners", 64 * corners(size).map(u64::from).iter().product::<u64>()) }
     }
 
-    pub fn bindings(&self) -> Bindings<'_> {
+    pub fn bindings(&self) -> Bindings {
         vec![("corners", (&self.corners).into())]
     }
 }
@@ -63,11 +62,6 @@ fn corners(size: [u32; 2]) -> [u32; 2] {
     size.map(|pixels| pixels.div_ceil(TILE) + 3)
 }
 
-/// The kernels where each pixel is worked out, and where cells are.
-pub(crate) const WHOLE: [(&str, &str); 1] = [("composite", "composite")];
-pub(crate) const CELLS: [(&str, &str); 3] =
-    [("composite", "backdrop"), ("composite", "composite_cells"), ("composite", "composite_list")];
-
 /// Whether what is behind the clouds is worked out by cells: where clouds are marched so, and cells as narrow as theirs. The
 /// high clouds are a single layer then, as they are from below.
 pub(crate) fn by_cells(frame: &Frame, quality: &Quality) -> bool {
@@ -75,84 +69,38 @@ pub(crate) fn by_cells(frame: &Frame, quality: &Quality) -> bool {
     quality.contrast > 0.0 && single && TILE as f32 * frame.marched_angle() / frame.stride as f32 <= WIDEST
 }
 
-/// Composes the cells of the sheet of `frame`, and lists those that are not smooth.
-pub(crate) fn run_cells(
-    gpu: &Gpu,
-    work: &mut Work<'_>,
-    scene: &Scene<'_>,
-    frame: &Frame,
-    parts: &Parts<'_>,
-    layers: bool,
-) -> Result<()> {
+/// Composes the sheet of `frame`: cells, then the pixels of those that are not smooth, or all of them; then those in which a disc
+/// of light is seen.
+pub(crate) fn record(rec: &mut Recorder<'_>, frame: &Frame, params: &Params, parts: &Parts<'_>, by_cells: bool) {
+    let gpu = rec.gpu;
     let Parts { marched, backdrop, refined, out } = parts;
-    let size = [frame.width, frame.rows];
-    let [columns, rows] = corners(size);
-    let bindings = [scene.bindings.as_slice(), &backdrop.bindings()].concat();
-    let kernel = gpu.kernel("composite", "backdrop", variant(scene.variant, frame, layers))?;
-    work.dispatch(&kernel, &bindings, [columns, rows, 1])?;
-    let bindings = [bindings, marched.bindings(), refined.bindings(), out.bindings()].concat();
-    let kernel = gpu.kernel("composite", "composite_cells", variant(scene.variant, frame, layers))?;
-    work.clear(&refined.count);
-    let [columns, rows] = size.map(|pixels| pixels.div_ceil(TILE));
-    work.dispatch(&kernel, &bindings, [columns, rows, 1])
-}
-
-/// Composes pixels of the listed cells: `frame.active_rays` of them from `frame.first_ray` on.
-pub(crate) fn run_list(
-    gpu: &Gpu,
-    work: &mut Work<'_>,
-    scene: &Scene<'_>,
-    frame: &Frame,
-    parts: &Parts<'_>,
-    layers: bool,
-) -> Result<()> {
-    let Parts { marched, refined, out, .. } = parts;
-    let bindings = [scene.bindings.as_slice(), &marched.bindings(), &refined.bindings(), &out.bindings()].concat();
-    let kernel = gpu.kernel("composite", "composite_list", variant(scene.variant, frame, layers))?;
-    work.dispatch(&kernel, &bindings, [frame.active_rays, 1, 1])
-}
-
-/// Composes the pixels of the sheet of `frame` in which a disc of light is seen, anew.
-pub(crate) fn run_discs(
-    gpu: &Gpu,
-    work: &mut Work<'_>,
-    scene: &Scene<'_>,
-    frame: &Frame,
-    parts: &Parts<'_>,
-    layers: bool,
-) -> Result<()> {
-    let Parts { marched, out, .. } = parts;
-    let bindings = [scene.bindings.as_slice(), &marched.bindings(), &out.bindings()].concat();
-    let variant = Variant { discs: true, ..variant(scene.variant, frame, layers) };
-    work.dispatch(&*gpu.kernel("composite", "composite_discs", variant)?, &bindings, [frame.columns, frame.rows, 1])
-}
-
-/// Composes the band of `frame`; `layers` fills `sky` and `depth` too, which takes lavapipe a seventh of the time.
-pub(crate) fn run(
-    gpu: &Gpu,
-    work: &mut Work<'_>,
-    scene: &Scene<'_>,
-    frame: &Frame,
-    parts: &Parts<'_>,
-    layers: bool,
-) -> Result<()> {
-    let Parts { marched, out, .. } = parts;
-    let bindings = [scene.bindings.as_slice(), &marched.bindings(), &out.bindings()].concat();
-    let kernel = gpu.kernel("composite", "composite", variant(scene.variant, frame, layers))?;
-    work.dispatch(&kernel, &bindings, [frame.width, frame.rows, 1])
-}
-
-/// What it is made for.
-pub(crate) fn variant(of: Variant, frame: &Frame, layers: bool) -> Variant {
-    let high = frame.high_clouds > 0;
-    Variant {
-        high,
-        high_emboss: high && frame.high_emboss > 0,
-        high_low_sun: high && frame.high_low_sun > 0,
-        cloudless: frame.cloudless > 0,
-        ground_shadow: frame.ground_shadow > 0,
-        layers,
-        wide: frame.sky_samples > 1,
-        ..of
+    let frame = Frame { first_row: frame.sheet_row, ..frame.clone() };
+    let ours = [marched.bindings(), out.bindings()].concat();
+    if by_cells {
+        let block = vec![("frame", frame.block(gpu))];
+        let size = [frame.width, frame.rows];
+        let [columns, rows] = corners(size);
+        rec.dispatch(("composite", "backdrop"), [block.clone(), backdrop.bindings()].concat(), [columns, rows, 1]);
+        let [columns, rows] = size.map(|pixels| pixels.div_ceil(TILE));
+        let ours = [ours.clone(), refined.bindings()].concat();
+        rec.clear(&refined.count);
+        let cells = [block, backdrop.bindings(), ours.clone()].concat();
+        rec.dispatch(("composite", "composite_cells"), cells, [columns, rows, 1]);
+        let list = refined.list(columns * rows, TILE * TILE);
+        rec.dispatch_list(("composite", "composite_list"), &ours, &list, |first_ray| {
+            Frame { first_ray, ..frame.clone() }.block(gpu)
+        });
+    } else {
+        rec.dispatch_rows(("composite", "composite"), &ours, [frame.width, frame.rows], |rows| {
+            let (first_row, rows) = (frame.sheet_row + rows.start, rows.len() as u32);
+            Frame { first_row, rows, ..frame.clone() }.block(gpu)
+        });
+    }
+    for [first_column, first_row, columns, rows] in frame.disc_pixels(params) {
+        let block = Frame { first_column, first_row, columns, rows, ..frame.clone() }.block(gpu);
+        let usual = rec.specialize_with(&[("DISCS", 1.0)]);
+        let bindings = [vec![("frame", block)], ours.clone()].concat();
+        rec.dispatch(("composite", "composite_discs"), bindings, [columns, rows, 1]);
+        rec.specialize(usual);
     }
 }

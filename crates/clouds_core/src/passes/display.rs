@@ -1,12 +1,12 @@
 //! Pictures on their way to a window: on the device, in 8 bits.
 
 use super::composite::Composed;
-use super::{Bindings, Scene};
 use crate::color::{TONE_MAPS, to_srgb8, tone_map_index};
 use crate::error::{Error, Result};
 use crate::frame::Frame;
-use crate::gpu::{Gpu, Work};
-use crate::kernel::Variant;
+use crate::gpu::Gpu;
+use crate::kernel::Bindings;
+use crate::recorder::Recorder;
 
 /// A texture of the device that a window shows: 8-bit pixels, encoded for a display.
 pub struct Screen {
@@ -75,21 +75,14 @@ impl Screen {
         Ok(())
     }
 
-    fn bindings(&self) -> Bindings<'_> {
+    fn bindings(&self) -> Bindings {
         vec![("screen", (&self.view).into()), ("shown", (&self.shown).into())]
     }
 }
 
-/// Shows the band of `frame`.
-pub(crate) fn run(
-    gpu: &Gpu,
-    work: &mut Work<'_>,
-    scene: &Scene<'_>,
-    frame: &Frame,
-    composed: &Composed,
-    screen: &Screen,
-) -> Result<()> {
-    let bindings = [scene.bindings.as_slice(), &composed.bindings(), &screen.bindings()].concat();
-    let kernel = gpu.kernel("display", "display", Variant::bake())?;
-    work.dispatch(&kernel, &bindings, [frame.width, frame.rows, 1])
+/// Shows a picture.
+pub(crate) fn record(rec: &mut Recorder<'_>, frame: &Frame, composed: &Composed, screen: &Screen) {
+    let block = Frame { first_row: 0, rows: frame.height, ..frame.clone() }.block(rec.gpu);
+    let bindings = [vec![("frame", block)], composed.bindings(), screen.bindings()].concat();
+    rec.dispatch(("display", "display"), bindings, [frame.width, frame.height, 1]);
 }

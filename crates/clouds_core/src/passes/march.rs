@@ -1,12 +1,13 @@
 //! The march through the clouds, of every pixel or of a subset.
 
-use super::refine::Refined;
-use super::{Bindings, Scene};
-use crate::error::Result;
+use super::refine::{self, Refined};
 use crate::frame::Frame;
-use crate::gpu::{Gpu, Work};
+use crate::gpu::Gpu;
+use crate::kernel::Bindings;
+use crate::params::Quality;
+use crate::recorder::Recorder;
 
-/// What the march makes of each pixel of a band or of a picture.
+/// What the march makes of each pixel of a sheet or of a picture.
 pub(crate) struct Marched {
     /// Premultiplied radiance and transmittance.
     pub clouds: wgpu::Buffer,
@@ -25,7 +26,7 @@ impl Marched {
         }
     }
 
-    pub fn bindings(&self) -> Bindings<'_> {
+    pub fn bindings(&self) -> Bindings {
         vec![
             ("clouds", (&self.clouds).into()),
             ("cloud_depth", (&self.depth).into()),
@@ -34,21 +35,34 @@ impl Marched {
     }
 }
 
-/// Marches the pixels of a list: `frame.active_rays` of them from `frame.first_ray` on.
-pub(crate) fn run_list(
-    gpu: &Gpu,
-    work: &mut Work<'_>,
-    scene: &Scene<'_>,
-    frame: &Frame,
-    refined: &Refined,
-    out: &Marched,
-) -> Result<()> {
-    let bindings = [scene.bindings.as_slice(), &out.bindings(), &refined.bindings()].concat();
-    work.dispatch(&*gpu.kernel("march", "march_list", scene.variant)?, &bindings, [frame.active_rays, 1, 1])
+/// Marches a sheet: the pixels of a lattice, then those between rays that do not look alike, or all of them.
+pub(crate) fn record(rec: &mut Recorder<'_>, frame: &Frame, quality: &Quality, refined: &Refined, out: &Marched) {
+    let gpu = rec.gpu;
+    if !refine::is_needed(frame, quality) {
+        let size = [frame.march_width, frame.sheet_rows];
+        return rec.dispatch_rows(("march", "march"), &out.bindings(), size, |rows| {
+            let (first_row, rows) = (frame.sheet_row + rows.start, rows.len() as u32);
+            Frame { first_row, rows, ..frame.clone() }.block(gpu)
+        });
+    }
+    let mut frame = Frame { lattice: refine::coarsest(frame, quality), ..frame.clone() };
+    refine::begin(rec, &frame, refined);
+    loop {
+        list(rec, &frame, refine::pixels(&frame), refined, out);
+        if frame.lattice == 1 {
+            return;
+        }
+        refine::record(rec, &frame, refined, out);
+        frame.lattice /= 2;
+        frame.spans = 1;
+    }
 }
 
-/// Marches the band of `frame` through the `scene`.
-pub(crate) fn run(gpu: &Gpu, work: &mut Work<'_>, scene: &Scene<'_>, frame: &Frame, out: &Marched) -> Result<()> {
-    let bindings = [scene.bindings.as_slice(), &out.bindings()].concat();
-    work.dispatch(&*gpu.kernel("march", "march", scene.variant)?, &bindings, [frame.march_width, frame.rows, 1])
+/// Marches the listed pixels, of which there are `most` at most.
+pub(crate) fn list(rec: &mut Recorder<'_>, frame: &Frame, most: u32, refined: &Refined, out: &Marched) {
+    let gpu = rec.gpu;
+    let bindings = [out.bindings(), refined.bindings()].concat();
+    rec.dispatch_list(("march", "march_list"), &bindings, &refined.list(most, 1), |first_ray| {
+        Frame { first_ray, ..frame.clone() }.block(gpu)
+    });
 }

@@ -2,11 +2,11 @@
 
 use std::time::Instant;
 
-use super::{Bindings, Context, Scene};
 use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::gpu::Gpu;
-use crate::kernel::Kernel;
+use crate::kernel::{Bindings, Name};
+use crate::recorder::Recorder;
 
 /// Most turns of a dispatch: with the loops inside one, lavapipe's limit of 65,535 over a shader is far (hazard 21).
 const MOST_TURNS: u32 = 2048;
@@ -32,7 +32,7 @@ impl Rays {
     }
 
     /// `state` is the variable that the rays are kept in.
-    pub fn bindings(&self, state: &'static str) -> Bindings<'_> {
+    pub fn bindings(&self, state: &'static str) -> Bindings {
         vec![
             (state, (&self.state).into()),
             ("active_rays", (&self.active).into()),
@@ -41,35 +41,31 @@ impl Rays {
         ]
     }
 
-    /// Runs `kernel` until the ray of each pixel of the band is done. `state` is the variable that they are kept in.
+    /// Runs a kernel until the ray of each pixel of the sheet is done. `state` is the variable that they are kept in.
     pub fn run(
         &self,
-        ctx: &mut Context<'_>,
-        scene: &Scene<'_>,
+        rec: &mut Recorder<'_>,
         frame: &Frame,
-        kernel: &Kernel,
+        kernel: Name,
         state: &'static str,
-        outputs: &Bindings<'_>,
+        outputs: &Bindings,
     ) -> Result<()> {
-        let mut clear = ctx.gpu.work();
-        clear.clear(&self.state);
-        clear.submit(ctx.timings, ctx.interrupt)?;
-        let bindings = [scene.bindings.as_slice(), outputs, &self.bindings(state)].concat();
+        rec.clear(&self.state);
+        let bindings = [outputs.as_slice(), &self.bindings(state)].concat();
         let mut active: Vec<u32> = (0..frame.width * frame.rows).collect();
         let mut budget = 32;
         while !active.is_empty() {
             let count = active.len() as u32;
-            ctx.gpu.queue.write_buffer(&self.active, 0, bytemuck::cast_slice(&active));
-            scene.uniforms.upload_frame(ctx.gpu, &Frame { active_rays: count, budget, ..frame.clone() });
-            let mut work = ctx.gpu.work();
-            work.dispatch(kernel, &bindings, [count, 1, 1])?;
-            work.download(&self.progress, 0, 8 * u64::from(count));
+            rec.gpu.queue.write_buffer(&self.active, 0, bytemuck::cast_slice(&active));
+            let block = Frame { active_rays: count, budget, ..frame.clone() }.block(rec.gpu);
+            rec.dispatch(kernel, [&[("frame", block)], bindings.as_slice()].concat(), [count, 1, 1]);
+            rec.download(&self.progress, 0, 8 * u64::from(count));
             let started = Instant::now();
-            let downloads = work.submit(ctx.timings, ctx.interrupt)?;
+            let downloads = rec.flush()?;
             let progress: &[[u32; 2]] = downloads[0].numbers();
             // A driver that ends loops by itself must not pass for convergence.
             if let Some([turns, _]) = progress.iter().find(|[turns, done]| *done == 0 && *turns != budget) {
-                let what = format!("{} ended a loop after {turns} of {budget} turns", ctx.gpu.info.name);
+                let what = format!("{} ended a loop after {turns} of {budget} turns", rec.gpu.info.name);
                 return Err(Error::Device(format!("{what}: its results cannot be trusted")));
             }
             active = active.iter().zip(progress).filter(|(_, [_, done])| *done == 0).map(|(ray, _)| *ray).collect();

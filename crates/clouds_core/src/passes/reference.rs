@@ -2,15 +2,14 @@
 
 use super::march::Marched;
 use super::rays::Rays;
-use super::{Context, Scene};
 use crate::error::Result;
 use crate::frame::Frame;
+use crate::recorder::Recorder;
 
 /// Bytes of a `ReferenceRay` of bindings.wgsl.
 pub const RAY_BYTES: u64 = 192;
 
-/// Integrates the band of `frame`.
-pub(crate) fn run(ctx: &mut Context<'_>, scene: &Scene<'_>, frame: &Frame, rays: &Rays, out: &Marched) -> Result<()> {
-    let kernel = ctx.gpu.kernel("reference", "reference", scene.variant)?;
-    rays.run(ctx, scene, frame, &kernel, "reference_rays", &out.bindings())
+/// Integrates the sheet of `frame`.
+pub(crate) fn run(rec: &mut Recorder<'_>, frame: &Frame, rays: &Rays, out: &Marched) -> Result<()> {
+    rays.run(rec, frame, ("reference", "reference"), "reference_rays", &out.bindings())
 }

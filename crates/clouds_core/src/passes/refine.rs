@@ -3,12 +3,12 @@
 use std::f32::consts::PI;
 
 use super::march::Marched;
-use super::{Bindings, Scene};
 use crate::camera::Camera;
-use crate::error::Result;
 use crate::frame::Frame;
-use crate::gpu::{Gpu, Work};
+use crate::gpu::Gpu;
+use crate::kernel::Bindings;
 use crate::params::Quality;
+use crate::recorder::{List, Recorder};
 
 /// Distance of the pixels that are marched first, at most: in pixels, and as an angle, radians. Clouds are lost between
 /// rays farther apart: at 1.3 degrees `fair_weather` errs by 11 %, at a third of one by 3 % (contrast 0.1).
@@ -42,7 +42,7 @@ pub(crate) fn spacing(sparse: bool) -> u32 {
 /// The pixels to be marched next.
 pub(crate) struct Refined {
     /// Their numbers in the sheet.
-    pub list: wgpu::Buffer,
+    entries: wgpu::Buffer,
     /// How many there are.
     pub count: wgpu::Buffer,
     /// Between which distances the ray of each pixel of the sheet meets cloud.
@@ -52,32 +52,34 @@ pub(crate) struct Refined {
 impl Refined {
     pub fn new(gpu: &Gpu, pixels: u64) -> Self {
         Self {
-            list: gpu.buffer("active_rays", 4 * pixels),
+            entries: gpu.buffer("active_rays", 4 * pixels),
             count: gpu.buffer("ray_count", 4),
             span: gpu.buffer("cloud_span", 8 * pixels),
         }
     }
 
-    pub fn bindings(&self) -> Bindings<'_> {
+    pub fn bindings(&self) -> Bindings {
         vec![
-            ("active_rays", (&self.list).into()),
+            ("active_rays", (&self.entries).into()),
             ("ray_count", (&self.count).into()),
             ("cloud_span", (&self.span).into()),
         ]
     }
 
-    /// Begins with the lattice of `frame`, of which the last column and row are a part. Returns how many pixels it has.
-    pub fn begin(&self, gpu: &Gpu, frame: &Frame) -> u32 {
-        let along = |size: u32| {
-            let last = size - 1;
-            (0..last).step_by(frame.lattice as usize).chain([last])
-        };
-        let lattice: Vec<u32> = along(frame.sheet_rows)
-            .flat_map(|y| along(frame.march_width).map(move |x| y * frame.march_width + x))
-            .collect();
-        gpu.queue.write_buffer(&self.list, 0, bytemuck::cast_slice(&lattice));
-        lattice.len() as u32
+    /// The list, of at most so many entries with so many invocations each.
+    pub fn list(&self, most: u32, each: u32) -> List<'_> {
+        List { count: &self.count, most, each }
     }
+}
+
+/// Columns and rows of the lattice of `frame`, of which the last column and row are a part.
+fn lattice(frame: &Frame) -> [u32; 2] {
+    [frame.march_width, frame.sheet_rows].map(|size| (size - 1).div_ceil(frame.lattice) + 1)
+}
+
+/// How many pixels it has.
+pub(crate) fn pixels(frame: &Frame) -> u32 {
+    lattice(frame).iter().product()
 }
 
 /// Whether pixels between marched ones are looked at.
@@ -91,17 +93,17 @@ pub(crate) fn coarsest(frame: &Frame, quality: &Quality) -> u32 {
     [COARSEST, 2].into_iter().find(fits).unwrap_or(1)
 }
 
+/// Lists the pixels of the lattice of `frame`.
+pub(crate) fn begin(rec: &mut Recorder<'_>, frame: &Frame, refined: &Refined) {
+    let [columns, rows] = lattice(frame);
+    let bindings = [vec![("frame", frame.block(rec.gpu))], refined.bindings()].concat();
+    rec.clear(&refined.count);
+    rec.dispatch(("refine", "list_lattice"), bindings, [columns, rows, 1]);
+}
+
 /// Halves the distance `frame.lattice` of the lattice: interpolates `out`, or lists pixels to be marched.
-pub(crate) fn run(
-    gpu: &Gpu,
-    work: &mut Work<'_>,
-    scene: &Scene<'_>,
-    frame: &Frame,
-    refined: &Refined,
-    out: &Marched,
-) -> Result<()> {
-    let bindings = [scene.bindings.as_slice(), &out.bindings(), &refined.bindings()].concat();
-    let [width, height] = [frame.march_width, frame.sheet_rows].map(|size| (size - 1).div_ceil(frame.lattice) + 1);
-    work.clear(&refined.count);
-    work.dispatch(&*gpu.kernel("refine", "refine", scene.variant)?, &bindings, [width, height, 1])
+pub(crate) fn record(rec: &mut Recorder<'_>, frame: &Frame, refined: &Refined, out: &Marched) {
+    let bindings = [vec![("frame", frame.block(rec.gpu))], out.bindings(), refined.bindings()].concat();
+    let [columns, rows] = lattice(frame);
+    rec.dispatch(("refine", "refine"), bindings, [columns, rows, 1]);
 }

@@ -1,12 +1,13 @@
 //! Temporal reprojection: one pixel in sixteen is marched, the others come from the frame before. Of a sparse picture, whose
 //! clouds are known at one pixel in sixteen, one in four of those is.
 
-use super::march::Marched;
-use super::refine::Refined;
-use super::{Bindings, Scene};
-use crate::error::Result;
+use super::march::{self, Marched};
+use super::refine::{self, Refined};
 use crate::frame::Frame;
-use crate::gpu::{Gpu, Work};
+use crate::gpu::Gpu;
+use crate::kernel::{Binding, Bindings};
+use crate::params::Quality;
+use crate::recorder::Recorder;
 use crate::scene_depth::SceneTextures;
 
 /// One of this many pixels that are known is marched in a frame, in each direction.
@@ -52,6 +53,10 @@ pub(crate) fn subpixel(index: u32, sparse: bool) -> [u32; 2] {
     ORDER[(index % round(sparse)) as usize].map(|place| scale * place)
 }
 
+/// Largest share of the pixels of a frame that are marched one by one: a still, which marches an eighth to a fifth of them, is
+/// nearer to the truth then and takes no longer.
+const MOST_LISTED: f32 = 1.0 / 12.0;
+
 /// A frame, and what it rests on.
 pub(crate) struct Followed {
     pub marched: Marched,
@@ -64,12 +69,12 @@ impl Followed {
         Self { marched: Marched::new(gpu, pixels), length: gpu.buffer("followed", 4 * pixels) }
     }
 
-    pub fn bindings(&self) -> Bindings<'_> {
+    pub fn bindings(&self) -> Bindings {
         [self.marched.bindings(), vec![("followed", (&self.length).into())]].concat()
     }
 
     /// As the frame before.
-    fn past(&self) -> Bindings<'_> {
+    fn past(&self) -> Bindings {
         vec![
             ("history", (&self.marched.clouds).into()),
             ("history_depth", (&self.marched.depth).into()),
@@ -80,8 +85,12 @@ impl Followed {
 
 /// The rays of a frame, one in each cell, and what the frame before says of them.
 pub(crate) struct Current {
-    pub marched: Marched,
+    marched: Marched,
     cells: wgpu::Buffer,
+    /// Votes for a still less those for going on.
+    votes: wgpu::Buffer,
+    /// Not 0 where the frame is a still.
+    still: wgpu::Buffer,
 }
 
 /// Bytes of `CellPast` (bindings.wgsl).
@@ -89,90 +98,93 @@ const CELL_BYTES: u64 = 64;
 
 impl Current {
     pub fn new(gpu: &Gpu, cells: u64) -> Self {
-        Self { marched: Marched::new(gpu, cells), cells: gpu.buffer("cells", CELL_BYTES * cells) }
+        Self {
+            marched: Marched::new(gpu, cells),
+            cells: gpu.buffer("cells", CELL_BYTES * cells),
+            votes: gpu.buffer("votes", 4),
+            still: gpu.buffer("is_still", 4),
+        }
     }
 
     /// What is kept of them on the device.
-    pub fn bindings(&self) -> Bindings<'_> {
-        [self.marched.bindings(), vec![("cells", (&self.cells).into())]].concat()
+    pub fn bindings(&self) -> Bindings {
+        [self.marched.bindings(), self.own()].concat()
     }
 
-    fn read(&self) -> Bindings<'_> {
-        vec![
-            ("fresh", (&self.marched.clouds).into()),
-            ("fresh_depth", (&self.marched.depth).into()),
-            ("cells", (&self.cells).into()),
-        ]
+    fn own(&self) -> Bindings {
+        vec![("cells", (&self.cells).into()), ("votes", (&self.votes).into()), ("is_still", (&self.still).into())]
+    }
+
+    fn read(&self) -> Bindings {
+        let rays = vec![("fresh", (&self.marched.clouds).into()), ("fresh_depth", (&self.marched.depth).into())];
+        [rays, self.own()].concat()
     }
 }
 
-/// The frame before.
-pub(crate) struct History<'a> {
-    /// Its clouds.
-    pub clouds: &'a Followed,
+/// What a frame is made in, and from.
+pub(crate) struct Buffers<'a> {
+    pub refined: &'a Refined,
+    pub current: &'a Current,
+    /// The clouds of the frame before.
+    pub before: &'a Followed,
     /// The user's scene in it.
-    pub scene: &'a SceneTextures,
+    pub scene_before: &'a SceneTextures,
+    pub now: &'a Followed,
 }
 
-/// Makes `out`, a still, the history of the frames after it.
-pub(crate) fn begin(gpu: &Gpu, work: &mut Work<'_>, scene: &Scene<'_>, frame: &Frame, out: &Followed) -> Result<()> {
-    let bindings = [scene.bindings.as_slice(), &out.bindings()].concat();
+/// Makes a frame of rays of its own, one in each cell, and of the frame before; or, where the history says too little, a still.
+/// `index` counts frames since the last cut.
+pub(crate) fn record(rec: &mut Recorder<'_>, frame: &Frame, quality: &Quality, index: u32, buffers: &Buffers<'_>) {
+    let gpu = rec.gpu;
+    let Buffers { refined, current, before, now, .. } = *buffers;
+    let sparse = frame.sparse > 0;
+    let stride = stride(sparse);
+    let mut rays = Frame { stride: stride * refine::spacing(sparse), ..frame.clone() };
+    [rays.subpixel_x, rays.subpixel_y] = subpixel(index, sparse);
+    [rays.march_width, rays.sheet_rows] = cells(frame.known(), sparse);
+    march::record(rec, &rays, quality, refined, &current.marched);
+
+    // Asks the frame before for these rays, and compares.
+    let block = ("frame", rays.block(gpu));
+    let grid = [rays.march_width, rays.sheet_rows, 1];
+    let read = [before.past(), current.read(), vec![block.clone()]].concat();
+    rec.clear(&current.votes);
+    rec.dispatch(("reproject", "predict"), read.clone(), grid);
+    rec.dispatch(("reproject", "validate"), read.clone(), grid);
+
+    // Follows, interpolates, or lists pixels that are to be marched, as neither rays nor past say anything about them.
+    let scene_before = vec![("scene_before", buffers.scene_before.depth())];
+    let read = [before.past(), current.read(), scene_before, now.bindings(), refined.bindings()].concat();
+    let [columns, rows] = [rays.march_width, frame.known()[1].div_ceil(stride)];
+    rec.clear(&refined.count);
+    rec.dispatch_rows(("reproject", "reproject"), &read, [columns, rows], |slice| {
+        let (first_row, rows) = (stride * slice.start, stride * slice.len() as u32);
+        Frame { first_row, rows: rows.min(frame.known()[1] - first_row), ..rays.clone() }.block(gpu)
+    });
+
+    // A still, where most rays are not what the past says, or more pixels are listed than one marches.
+    let listed = frame.of_known();
+    let pixels: u32 = frame.known().iter().product();
+    let most = if refine::is_needed(&listed, quality) { MOST_LISTED * pixels as f32 } else { f32::MAX };
+    let ours = [current.own(), refined.bindings(), vec![("most_listed", Binding::block(&[most.to_bits(), 0, 0, 0]))]];
+    rec.dispatch(("reproject", "choose"), ours.concat(), [1; 3]);
+    march::list(rec, &listed, pixels, refined, &now.marched);
+    rec.when(&current.still, |rec| begin(rec, frame, quality, refined, now));
+}
+
+/// Makes a still that is the history of the frames after it.
+pub(crate) fn begin(rec: &mut Recorder<'_>, frame: &Frame, quality: &Quality, refined: &Refined, out: &Followed) {
+    let mut still = frame.of_known();
+    march::record(rec, &still, quality, refined, &out.marched);
+    still.lattice = refine::coarsest(&still, quality);
+    let bindings = [vec![("frame", still.block(rec.gpu))], out.bindings()].concat();
     let [width, height] = frame.known();
-    work.dispatch(&*gpu.kernel("reproject", "begin", scene.variant)?, &bindings, [width, height, 1])
-}
-
-/// Asks the frame `before` for the rays of this one, and compares: `refined` counts votes for a still, less those for going on.
-pub(crate) fn validate(
-    gpu: &Gpu,
-    work: &mut Work<'_>,
-    scene: &Scene<'_>,
-    frame: &Frame,
-    current: &Current,
-    before: &History<'_>,
-    refined: &Refined,
-) -> Result<()> {
-    let ours = [before.clouds.past(), current.read(), refined.bindings()].concat();
-    let bindings = [scene.bindings.as_slice(), &ours].concat();
-    for entry in ["predict", "validate"] {
-        let kernel = gpu.kernel("reproject", entry, scene.variant)?;
-        work.dispatch(&kernel, &bindings, [frame.march_width, frame.sheet_rows, 1])?;
-    }
-    Ok(())
-}
-
-/// Fills `out` from the `current` rays and from the frame `before`, for the band of `frame`; lists in `refined` the pixels
-/// that are to be marched, as neither says anything about them.
-#[expect(clippy::too_many_arguments, reason = "what fills a frame")]
-pub(crate) fn run(
-    gpu: &Gpu,
-    work: &mut Work<'_>,
-    scene: &Scene<'_>,
-    frame: &Frame,
-    current: &Current,
-    before: &History<'_>,
-    refined: &Refined,
-    out: &Followed,
-) -> Result<()> {
-    let past = [before.clouds.past(), vec![("scene_before", before.scene.depth())]].concat();
-    let ours = [past, out.bindings(), refined.bindings(), current.read()].concat();
-    let bindings = [scene.bindings.as_slice(), &ours].concat();
-    work.dispatch(
-        &*gpu.kernel("reproject", "reproject", scene.variant)?,
-        &bindings,
-        [frame.march_width, frame.rows.div_ceil(stride(frame.sparse > 0)), 1],
-    )
+    rec.dispatch(("reproject", "begin"), bindings, [width, height, 1]);
 }
 
 /// Makes of the frame `before`, which had another size or was known at other pixels, one like `frame`.
-pub(crate) fn rescale(
-    gpu: &Gpu,
-    work: &mut Work<'_>,
-    scene: &Scene<'_>,
-    frame: &Frame,
-    before: &Followed,
-    out: &Followed,
-) -> Result<()> {
-    let bindings = [scene.bindings.as_slice(), &out.bindings(), &before.past()].concat();
+pub(crate) fn rescale(rec: &mut Recorder<'_>, frame: &Frame, before: &Followed, out: &Followed) {
+    let bindings = [vec![("frame", frame.block(rec.gpu))], out.bindings(), before.past()].concat();
     let [width, height] = frame.known();
-    work.dispatch(&*gpu.kernel("reproject", "rescale", scene.variant)?, &bindings, [width, height, 1])
+    rec.dispatch(("reproject", "rescale"), bindings, [width, height, 1]);
 }

@@ -2,11 +2,12 @@
 
 use glam::DVec3;
 
-use super::{Baked, Bindings, Context, transmittance};
+use super::{Inputs, Lut, transmittance, view};
 use crate::camera::Camera;
 use crate::error::Result;
 use crate::frame::Frame;
 use crate::params::{self, Params};
+use crate::recorder::Recorder;
 
 /// Texels of the sky map: azimuth from the sun, angle from the horizon.
 const SIZE: [u32; 3] = [128, 160, 1];
@@ -42,35 +43,23 @@ pub(super) fn near(eye: DVec3, params: &Params, step: f64) -> DVec3 {
 }
 
 /// The sky on the GPU.
+#[derive(Default)]
 pub(crate) struct Sky {
-    made: Baked<Key, (wgpu::TextureView, wgpu::TextureView, wgpu::Buffer)>,
+    lut: Lut<Key, (wgpu::TextureView, wgpu::TextureView, wgpu::Buffer)>,
 }
 
 impl Sky {
-    pub const fn new() -> Self {
-        Self { made: Baked::new() }
-    }
-
-    /// `air` holds what `transmittance` and `multiscatter` have baked.
-    pub fn run(
-        &mut self,
-        ctx: &mut Context<'_>,
-        params: &Params,
-        frame: &Frame,
-        eye: DVec3,
-        air: &Bindings<'_>,
-    ) -> Result<Bindings<'_>> {
+    pub fn update(&mut self, rec: &mut Recorder<'_>, inputs: &Inputs<'_>) -> Result<()> {
+        let Inputs { params, eye, .. } = *inputs;
         let layers = [params.clouds.base, params.clouds.top, params.high_clouds.altitude];
         let from = viewpoint(eye, params);
         let sun = params::Sun { visible: true, ..params.sun.clone() };
         let key = (sun, transmittance::air(params), params.atmosphere.night, from.to_array(), layers);
-        let (map, share, light) = self.made.get(key, || {
-            ctx.uniforms.upload_frame(ctx.gpu, &Frame::new(&Camera::equirect(from)?, params, 0.0, [1, 1]));
-            let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
-            let map = view(&ctx.gpu.texture("sky", SIZE, 1));
-            let share = view(&ctx.gpu.texture_3d("air_share", SHARE_SIZE));
-            let light = ctx.gpu.buffer("sky_light", 64);
-            let mut work = ctx.gpu.work();
+        let (map, share, light) = self.lut.update(rec, key, |rec| {
+            let frame = Frame::new(&Camera::equirect(from)?, params, 0.0, [1, 1]).block(rec.gpu);
+            let map = view(&rec.gpu.texture("sky", SIZE, 1));
+            let share = view(&rec.gpu.texture_3d("air_share", SHARE_SIZE));
+            let light = rec.gpu.buffer("sky_light", 64);
             let [across, down, _] = SHARE_SIZE;
             let bakes = [
                 ("sky_map_bake", ("map_out", (&map).into()), SIZE),
@@ -78,18 +67,16 @@ impl Sky {
                 ("sky_light_bake", ("sky_light", (&light).into()), [1; 3]),
             ];
             for (entry, out, size) in bakes {
-                let bindings = [ctx.uniforms.bindings().as_slice(), air, &[out]].concat();
-                work.dispatch(&*ctx.gpu.kernel("sky", entry, ctx.variant)?, &bindings, size)?;
+                rec.dispatch(("sky", entry), vec![("frame", frame.clone()), out], size);
             }
-            work.submit(ctx.timings, ctx.interrupt)?;
-            ctx.uniforms.upload_frame(ctx.gpu, frame);
             Ok((map, share, light))
         })?;
-        Ok(vec![
-            ("sky_map", map.into()),
-            ("air_share", share.into()),
-            ("sky_light", light.into()),
-            ("sky_light_uniform", light.into()),
-        ])
+        rec.bind([
+            ("sky_map", (&map).into()),
+            ("air_share", (&share).into()),
+            ("sky_light", (&light).into()),
+            ("sky_light_uniform", (&light).into()),
+        ]);
+        Ok(())
     }
 }

@@ -2,35 +2,36 @@
 
 use std::f64::consts::PI;
 
-use super::{Baked, Bindings, Context};
+use super::{Inputs, Lut, view};
 use crate::cache;
 use crate::error::Result;
 use crate::mie;
-use crate::params::{Params, Phase};
+use crate::params::Phase;
+use crate::recorder::Recorder;
 
 /// Angles of the table: pi sin^2 of equal steps, dense where peak and glory are. 0.14 degrees apart in the middle.
 const ENTRIES: usize = 2048;
 
 /// The table on the GPU: the phase function, 1/sr, and its integral from the forward direction, at each angle.
+#[derive(Default)]
 pub(crate) struct PhaseTable {
-    table: Baked<Option<f32>, wgpu::TextureView>,
+    lut: Lut<f32>,
 }
 
 impl PhaseTable {
-    pub const fn new() -> Self {
-        Self { table: Baked::new() }
-    }
-
-    pub fn run(&mut self, ctx: &Context<'_>, params: &Params) -> Result<Bindings<'_>> {
-        let diameter = (params.light.phase == Phase::Mie).then_some(params.light.droplet_diameter);
-        let view = self.table.get(diameter, || {
-            // A kernel that could read a texture must be given one.
-            let texels = diameter.map_or_else(|| vec![[0.0; 2]; 2], kept);
-            let texture = ctx.gpu.flat("phase_table", [texels.len() as u32, 1], wgpu::TextureFormat::Rg32Float);
-            ctx.gpu.write_texture(&texture, &texels);
-            Ok(texture.create_view(&wgpu::TextureViewDescriptor::default()))
+    pub fn update(&mut self, rec: &mut Recorder<'_>, inputs: &Inputs<'_>) -> Result<()> {
+        let light = &inputs.params.light;
+        if light.phase != Phase::Mie {
+            return Ok(());
+        }
+        let table = self.lut.update(rec, light.droplet_diameter, |rec| {
+            let texels = kept(light.droplet_diameter);
+            let texture = rec.gpu.flat("phase_table", [texels.len() as u32, 1], wgpu::TextureFormat::Rg32Float);
+            rec.gpu.write_texture(&texture, &texels);
+            Ok(view(&texture))
         })?;
-        Ok(vec![("phase_table", view.into())])
+        rec.bind([("phase_table", (&table).into())]);
+        Ok(())
     }
 }
 

@@ -1,0 +1,54 @@
+//! What the density nearby never exceeds, for delta tracking: baked when paths are traced.
+
+use super::volume::Grid;
+use super::{Inputs, Lut, view, weather};
+use crate::error::Result;
+use crate::params::{self, BroadShares, Edge, Model};
+use crate::recorder::Recorder;
+
+/// Voxels along the side of a cell (as in majorant.wgsl).
+const BRICK: usize = 4;
+/// Most cells along a side of the weather map, and their height between the lowest and the highest clouds, m.
+const CELLS: u32 = 64;
+const CELL_HEIGHT: f32 = 125.0;
+/// Texels of the weather map's side for each cell.
+const TEXELS: u32 = 8;
+
+/// What the majorants are made from: the grid, or weather and cover.
+type Key = (Grid, (Vec<(params::Weather, f32)>, Edge, BroadShares), params::Clouds, params::UpperClouds);
+
+/// The majorants on the GPU.
+#[derive(Default)]
+pub(crate) struct Majorants {
+    lut: Lut<Key>,
+}
+
+impl Majorants {
+    pub fn update(&mut self, rec: &mut Recorder<'_>, inputs: &Inputs<'_>) -> Result<()> {
+        let params = inputs.params;
+        if params.light.model != Model::Path {
+            return Ok(());
+        }
+        let grid = Grid(params.volume.clone());
+        let weather = (params.weather_shares(), params.weather.edge, params.broad_shares());
+        let key = (grid, weather, params.clouds.clone(), params.upper_clouds.clone());
+        let majorants = self.lut.update(rec, key, |rec| {
+            let (entry, size) = match &params.volume {
+                Some(grid) => ("majorant_grid", grid.size().map(|n| n.div_ceil(BRICK) as u32)),
+                None => {
+                    let across = weather::size(params).map(|n| n.div_ceil(TEXELS).clamp(1, CELLS));
+                    let [base, top] = params.shell();
+                    let up = (((top - base) / CELL_HEIGHT) as u32).clamp(16, 64);
+                    ("majorant_weather", [across[0], across[1], up])
+                }
+            };
+            let [from, to] = ["bounds", "majorants"].map(|label| view(&rec.gpu.texture_3d(label, size)));
+            rec.dispatch(("majorant", entry), vec![("volume_out", (&from).into())], size);
+            let bindings = vec![("volume_in", (&from).into()), ("volume_out", (&to).into())];
+            rec.dispatch(("majorant", "majorant_dilate"), bindings, size);
+            Ok(to)
+        })?;
+        rec.bind([("majorants", (&majorants).into())]);
+        Ok(())
+    }
+}

@@ -1,0 +1,104 @@
+//! Sunlight through the clouds to the ground: a map for the user, and levels around the eye for pictures of the ground and of
+//! shaded air, baked when sun or clouds have changed, or when wind or eye have gone far.
+
+use glam::{DVec2, DVec3};
+
+use super::volume::Grid;
+use super::{Inputs, Lut, view};
+use crate::camera::Camera;
+use crate::clipmap::{Casters, Origin, casters};
+use crate::error::Result;
+use crate::frame::Frame;
+use crate::params::Params;
+use crate::recorder::Recorder;
+use crate::wind::Carried;
+
+/// Texels across a level, and levels (as in ground_shadow.wgsl).
+const SIDE: u32 = 88;
+const LEVELS: u32 = 5;
+/// The side of a texel of the finest level, m, for eyes up to so high; twice as long for each doubling of the altitude, as
+/// pixels are. The sun's half degree blurs shadows of clouds 3 km up by 28 m.
+const TEXEL: f32 = 64.0;
+const TEXEL_ALTITUDE: f32 = 12_000.0;
+
+/// The clouds may move so far while the shadows stay, m: half a texel, and a power of two, so that where winds have come
+/// round after times that are powers of two, shadows have too.
+const CLOUD_STEP: f64 = 32.0;
+
+/// What the shadows are made from: sun, clouds, weather, wind, planet and grid, and for where, how fine and when.
+pub(crate) type Key = (Casters, (f32, Grid), [i64; 3], f32);
+
+/// The same for a picture.
+pub(crate) fn key(inputs: &Inputs<'_>) -> Key {
+    let Inputs { params, frame, eye, time, .. } = *inputs;
+    let planet = (params.atmosphere.planet_radius, Grid(params.volume.clone()));
+    (casters(params), planet, origin(eye, params, time).steps, frame.shadow_texel)
+}
+
+/// The levels on the GPU.
+#[derive(Default)]
+pub(crate) struct GroundShadow {
+    lut: Lut<Key>,
+}
+
+/// From where and when a picture's shadows are baked: the user's grid stays where it is.
+fn origin(eye: DVec3, params: &Params, time: f64) -> Origin {
+    Origin::new(eye, params, if params.volume.is_some() { 0.0 } else { time }, CLOUD_STEP)
+}
+
+/// Where the eye is in the levels of its picture.
+pub(crate) fn eye_in(eye: DVec3, params: &Params, time: f64) -> [f32; 2] {
+    let origin = origin(eye, params, time);
+    let drift = match params.volume {
+        Some(_) => DVec2::ZERO,
+        None => Carried::new(params, origin.time, time).drift().truncate(),
+    };
+    (eye.truncate() - origin.place - drift).as_vec2().to_array()
+}
+
+/// The side of a texel of the finest level for an eye at an altitude, m.
+pub(crate) fn texel(altitude: f32) -> f32 {
+    TEXEL * (altitude / TEXEL_ALTITUDE).max(1.0).log2().floor().exp2()
+}
+
+/// Whether a picture reads them.
+fn wanted(frame: &Frame) -> bool {
+    frame.beams > 0 || frame.ground_shadow > 0 && frame.cloudless == 0
+}
+
+impl GroundShadow {
+    pub fn update(&mut self, rec: &mut Recorder<'_>, inputs: &Inputs<'_>) -> Result<()> {
+        let Inputs { params, frame, eye, time, .. } = *inputs;
+        if !wanted(frame) {
+            return Ok(());
+        }
+        let levels = self.lut.update(rec, key(inputs), |rec| {
+            let origin = origin(eye, params, time);
+            let size = [SIDE, SIDE * LEVELS, 1];
+            let [single, mean, levels] = [("", size), ("ground_shadow_mean", [1; 3]), ("ground_shadow", size)]
+                .map(|(label, size)| view(&rec.gpu.texture(label, size, 1)));
+            let there = Frame::new(&Camera::equirect(origin.place.extend(0.0))?, params, origin.time, [1, 1]);
+            let there = Frame { shadow_texel: frame.shadow_texel, ..there }.block(rec.gpu);
+            let (made, of_all) = (("ground_shadow", (&single).into()), ("ground_shadow_mean", (&mean).into()));
+            let mut bake = |entry, reads: &[_], out: &wgpu::TextureView, size| {
+                let ours = [("frame", there.clone()), ("map_out", out.into())];
+                rec.dispatch(("shadow", entry), [&ours, reads].concat(), size);
+            };
+            bake("shadow_ground", &[], &single, size);
+            bake("shadow_mean", &[made.clone()], &mean, [SIDE, 1, 1]);
+            bake("shadow_blend", &[made, of_all], &levels, size);
+            Ok(levels)
+        })?;
+        rec.bind([("ground_shadow", (&levels).into())]);
+        Ok(())
+    }
+}
+
+/// The user's map, of `size` by `size` texels, into `out`.
+pub(crate) fn map(rec: &mut Recorder<'_>, frame: &Frame, size: u32, out: &wgpu::Buffer) {
+    let bindings = vec![("shadow_out", out.into())];
+    let gpu = rec.gpu;
+    rec.dispatch_rows(("shadow", "shadow_map"), &bindings, [size, size], |rows| {
+        Frame { first_row: rows.start, rows: rows.len() as u32, ..frame.clone() }.block(gpu)
+    });
+}

@@ -1,0 +1,36 @@
+//! The optical depth of the air to space, by altitude and direction.
+
+use super::{Inputs, Lut, bake_map, load_or_bake, view};
+use crate::error::Result;
+use crate::params::{self, Params};
+use crate::recorder::Recorder;
+
+/// Texels: distance to the top of the air, altitude (Hillaire 2020).
+const SIZE: [u32; 3] = [256, 64, 1];
+
+/// The table on the GPU.
+#[derive(Default)]
+pub(crate) struct Transmittance {
+    lut: Lut<params::Atmosphere>,
+}
+
+impl Transmittance {
+    pub fn update(&mut self, rec: &mut Recorder<'_>, inputs: &Inputs<'_>) -> Result<()> {
+        let from = air(inputs.params);
+        let key = format!("{from:?}");
+        let table = self.lut.update(rec, from, |rec| {
+            let texture = rec.gpu.texture("air_depth", SIZE, 1);
+            load_or_bake(rec, "transmittance", "transmittance", &key, &[&texture], |rec| {
+                bake_map(rec, ("transmittance", "transmittance_bake"), None, &texture);
+            })?;
+            Ok(view(&texture))
+        })?;
+        rec.bind([("air_depth", (&table).into())]);
+        Ok(())
+    }
+}
+
+/// What the air alone is made from: how much of it is seen between eye and clouds does not matter, nor the night behind it.
+pub(super) fn air(params: &Params) -> params::Atmosphere {
+    params::Atmosphere { aerial_perspective: 1.0, night: [0.0; 3], ..params.atmosphere.clone() }
+}

@@ -1,0 +1,50 @@
+//! The user's grid on the GPU, in the form that is read: half floats to be filtered, or f32 to be loaded.
+
+use std::sync::Arc;
+
+use super::{Inputs, Lut, view};
+use crate::error::Result;
+use crate::recorder::Recorder;
+use crate::volume::DensityGrid;
+
+/// The grid as a texture, 1 at its largest extinction, which half floats could not hold.
+#[derive(Default)]
+pub(crate) struct Volume {
+    lut: Lut<(Grid, bool)>,
+}
+
+/// Which grid there is: the same only if it is one in memory, as comparing them voxel by voxel would take longer than baking.
+/// It is held, so that no other can come to lie where it was.
+#[derive(Clone)]
+pub(crate) struct Grid(pub Option<Arc<DensityGrid>>);
+
+impl PartialEq for Grid {
+    fn eq(&self, other: &Self) -> bool {
+        self.0.as_ref().map(Arc::as_ptr) == other.0.as_ref().map(Arc::as_ptr)
+    }
+}
+
+impl Volume {
+    pub fn update(&mut self, rec: &mut Recorder<'_>, inputs: &Inputs<'_>) -> Result<()> {
+        let Some(grid) = &inputs.params.volume else { return Ok(()) };
+        let precise = inputs.quality.is_precise(inputs.params);
+        let name = if precise { "volume_exact" } else { "volume" };
+        let texture = self.lut.update(rec, (Grid(Some(grid.clone())), precise), |rec| {
+            let size = grid.size().map(|n| n as u32);
+            let scale = grid.max().max(f32::MIN_POSITIVE).recip();
+            let scaled = grid.extinction().iter().map(|v| v * scale);
+            let texture = if precise {
+                let texture = rec.gpu.volume(name, size, 1, wgpu::TextureFormat::R32Float);
+                rec.gpu.write_texture(&texture, &scaled.collect::<Vec<_>>());
+                texture
+            } else {
+                let texture = rec.gpu.volume(name, size, 1, wgpu::TextureFormat::R16Float);
+                rec.gpu.write_texture(&texture, &scaled.map(half::f16::from_f32).collect::<Vec<_>>());
+                texture
+            };
+            Ok(view(&texture))
+        })?;
+        rec.bind([(name, (&texture).into())]);
+        Ok(())
+    }
+}

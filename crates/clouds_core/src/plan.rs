@@ -1,0 +1,91 @@
+//! What a picture needs: which integrator, which pixels hold a sample, in which strips. It follows from the picture alone.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use crate::frame::Frame;
+use crate::kernel::Specialization;
+use crate::params::{Model, Params, Quality};
+use crate::passes::refine::COARSEST;
+use crate::passes::{composite, refine};
+use crate::specialization;
+
+/// How the clouds of a picture are computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Integrator {
+    /// By so many steps.
+    March,
+    /// By steps that are halved until nothing changes.
+    Reference,
+    /// By tracing paths.
+    Path,
+}
+
+impl Integrator {
+    pub fn new(params: &Params, quality: &Quality) -> Self {
+        match params.light.model {
+            Model::Path => Self::Path,
+            _ if quality.tolerance > 0.0 => Self::Reference,
+            _ => Self::March,
+        }
+    }
+
+    /// Whether there is nothing to march.
+    pub fn is_cloudless(self, params: &Params) -> bool {
+        self == Self::March && !params.has_clouds()
+    }
+}
+
+/// Most pixels of a strip, which is as much of a still as the device holds: 64 bytes each.
+const STRIP_PIXELS: u32 = 1 << 20;
+/// Most rays that are on their way together where they take many dispatches.
+const STRIP_RAYS: u32 = 1 << 14;
+
+/// What a picture needs.
+pub(crate) struct Plan {
+    pub integrator: Integrator,
+    /// Whether what is behind the clouds is worked out by cells.
+    pub by_cells: bool,
+    /// Rows of each strip.
+    pub strips: Vec<Range<u32>>,
+    pub specialization: Arc<Specialization>,
+}
+
+impl Plan {
+    /// The plan of a picture, which completes its `frame`. `whole`: it has one strip. `layers`: the sky and the depth are asked
+    /// for too.
+    pub fn new(frame: &mut Frame, params: &Params, quality: &Quality, whole: bool, layers: bool) -> Self {
+        let integrator = Integrator::new(params, quality);
+        let march = integrator == Integrator::March;
+        frame.cloudless = u32::from(integrator.is_cloudless(params));
+        frame.sparse = u32::from(march && refine::is_sparse(frame, quality));
+        let rows = match integrator {
+            _ if whole => frame.height,
+            Integrator::March => (STRIP_PIXELS / frame.width).next_multiple_of(COARSEST),
+            Integrator::Reference | Integrator::Path => STRIP_RAYS / frame.width,
+        };
+        let rows = rows.clamp(1, frame.height);
+        let strips = (0..frame.height).step_by(rows as usize).map(|row| row..(row + rows).min(frame.height));
+        Self {
+            integrator,
+            by_cells: march && composite::by_cells(frame, quality),
+            strips: strips.collect(),
+            specialization: specialization::of_picture(params, quality, frame, layers),
+        }
+    }
+
+    /// Sets the rows of a strip. Lattices of rays meet in the first row of the next one.
+    pub fn set_strip(&self, frame: &mut Frame, quality: &Quality, strip: &Range<u32>) {
+        let lattice = self.integrator == Integrator::March && refine::is_needed(frame, quality);
+        let shared = u32::from(lattice && strip.end < frame.height);
+        frame.sheet_row = strip.start;
+        frame.rows = strip.len() as u32;
+        frame.sheet_rows = frame.rows + shared;
+    }
+
+    /// Most rows that the buffers of a strip hold.
+    pub fn most_rows(&self) -> u32 {
+        let shared = u32::from(self.integrator == Integrator::March);
+        self.strips.iter().map(|strip| strip.len() as u32 + shared).max().unwrap_or(1)
+    }
+}

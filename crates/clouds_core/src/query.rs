@@ -1,0 +1,196 @@
+//! Answers about a sky without a picture of it.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use crate::camera::Camera;
+use crate::error::{Error, Result};
+use crate::frame::Frame;
+use crate::gpu::{Interrupt, Timings, check_fork};
+use crate::kernel::{Program, Specialization};
+use crate::luts::{Inputs, shadow};
+use crate::params::Params;
+use crate::passes::points;
+use crate::recorder::{Recorder, Which};
+use crate::renderer::{Renderer, held};
+use crate::shader::Linked;
+use crate::shot::Shot;
+use crate::specialization;
+
+/// Most texels along a side of the user's shadow map.
+const MOST_SHADOW: u32 = 8192;
+
+impl Renderer {
+    /// Extinction in 1/m at world points: the field that [`Renderer::render`] marches.
+    pub fn density(
+        &mut self,
+        at: &[[f64; 3]],
+        params: &Params,
+        time: f64,
+        interrupt: Interrupt<'_>,
+    ) -> Result<Vec<f32>> {
+        self.ask("extinction_at_points", at, params, time, interrupt)
+    }
+
+    /// The share of direct sunlight that reaches world points through the clouds; 0 where the ground hides the sun.
+    pub fn sun_transmittance(
+        &mut self,
+        at: &[[f64; 3]],
+        params: &Params,
+        time: f64,
+        interrupt: Interrupt<'_>,
+    ) -> Result<Vec<f32>> {
+        self.ask("sun_transmittance_at_points", at, params, time, interrupt)
+    }
+
+    /// The optical depth of all clouds from an eye along directions; -1 where the ground is in the way.
+    pub fn depth_along(
+        &mut self,
+        eye: DVec3,
+        directions: &[[f64; 3]],
+        params: &Params,
+        time: f64,
+        interrupt: Interrupt<'_>,
+    ) -> Result<Vec<f32>> {
+        check_fork()?;
+        let camera = Camera::equirect(eye)?;
+        let points: Vec<_> =
+            directions.iter().map(|d| DVec3::from_array(*d).as_vec3().normalize().extend(0.0).to_array()).collect();
+        let kernel = Which::Named(("points", "depth_along_directions"), self.of_points(params));
+        let answers = self.run_points(&kernel, &Shot::new(&camera, params, time), &points, points::CHUNK, interrupt)?;
+        Ok(answers.iter().map(|answer| answer[0]).collect())
+    }
+
+    fn ask(
+        &mut self,
+        entry: &'static str,
+        at: &[[f64; 3]],
+        params: &Params,
+        time: f64,
+        interrupt: Interrupt<'_>,
+    ) -> Result<Vec<f32>> {
+        check_fork()?;
+        let Some(first) = at.first() else { return Ok(Vec::new()) };
+        // Positions go to the GPU relative to the first: f32 keeps millimetres a few kilometres around it.
+        let eye = DVec3::from_array(*first);
+        let camera = Camera::equirect(eye)?;
+        let offset = |p: &[f64; 3]| (DVec3::from_array(*p) - eye).as_vec3().extend(0.0).to_array();
+        let points: Vec<_> = at.iter().map(offset).collect();
+        let kernel = Which::Named(("points", entry), self.of_points(params));
+        let answers = self.run_points(&kernel, &Shot::new(&camera, params, time), &points, points::CHUNK, interrupt)?;
+        Ok(answers.iter().map(|answer| answer[0]).collect())
+    }
+
+    fn of_points(&self, params: &Params) -> Arc<Specialization> {
+        specialization::of_points(params, &self.quality)
+    }
+
+    /// The share of direct sunlight that reaches a level square around `center` (east, north and altitude, m): `size` by `size`
+    /// numbers, row 0 in the north. `extent` is its side, m.
+    pub fn shadow_map(
+        &mut self,
+        params: &Params,
+        time: f64,
+        center: [f64; 3],
+        (extent, size): (f64, u32),
+        interrupt: Interrupt<'_>,
+    ) -> Result<Vec<f32>> {
+        if !(1..=MOST_SHADOW).contains(&size) {
+            return Err(Error::parameter("size", size, format!("a whole number from 1 to {MOST_SHADOW}")));
+        }
+        // Written so that NaN fails it.
+        if !(1.0..=1e7).contains(&extent) {
+            return Err(Error::parameter("extent", extent, "from 1 to 10000000 m"));
+        }
+        let [x, y, altitude] = center;
+        if !(-1e5..=1e5).contains(&altitude) {
+            return Err(Error::parameter("altitude", altitude, "from -100000 to 100000 m"));
+        }
+        if let Some(place) = [x, y].into_iter().find(|v| !(-1e8..=1e8).contains(v)) {
+            return Err(Error::parameter("center", place, "2 numbers from -100000000 to 100000000 m"));
+        }
+        let camera = Camera::equirect(DVec3::from_array(center))?;
+        let room = self.gpu.buffer("shadow_out", 4 * u64::from(size) * u64::from(size));
+        let (mut rec, frame) = self.record(&Shot::new(&camera, params, time), interrupt)?;
+        let shadow_texel = (extent / f64::from(size)) as f32;
+        let frame = Frame { width: size, height: size, march_width: size, sheet_rows: size, shadow_texel, ..frame };
+        shadow::map(&mut rec, &frame, size, &room);
+        rec.download(&room, 0, room.size());
+        let map = rec.submit()?;
+        Ok(map[0].numbers()[..(size * size) as usize].to_vec())
+    }
+
+    /// The weather map as the march reads it, baked, the user's own or mixed: its width and height in texels, and three
+    /// numbers for each of them, coverage, type and precipitation, row 0 in the north.
+    pub fn weather_map(&mut self, params: &Params, interrupt: Interrupt<'_>) -> Result<([u32; 2], Vec<f32>)> {
+        let camera = Camera::equirect(DVec3::ZERO)?;
+        let (frame, params) = Shot::new(&camera, params, 0.0).checked(self.size, &self.quality)?;
+        self.timings = Timings::default();
+        let mut rec = Recorder::new(&self.gpu, &mut self.timings, interrupt);
+        let texture = self.luts.weather_map(&mut rec, &params, &frame)?;
+        rec.download_texture(&texture);
+        let downloads = rec.submit()?;
+        let (width, height) = (texture.width() as usize, texture.height() as usize);
+        let halves: &[half::f16] = downloads[0].numbers();
+        // Rows are padded.
+        let rows = halves.chunks_exact(halves.len() / height).map(|row| &row[..4 * width]);
+        let texels = rows.flat_map(|row| row.chunks_exact(4));
+        let numbers = texels.flat_map(|texel| [texel[0], texel[1], texel[2]]).map(half::f16::to_f32);
+        Ok(([texture.width(), texture.height()], numbers.collect()))
+    }
+
+    /// The value of a WGSL `expression` of `x: vec4f` for each input, with the shaders named by `imports` in scope and
+    /// the eye at the origin: how tests reach single shader functions.
+    pub fn probe(
+        &mut self,
+        imports: &[String],
+        expression: &str,
+        inputs: &[[f32; 4]],
+        params: &Params,
+        (eye, time): (DVec3, f64),
+        interrupt: Interrupt<'_>,
+    ) -> Result<Vec<[f32; 4]>> {
+        check_fork()?;
+        let imports: String = imports.iter().map(|name| format!("#import {name}\n")).collect();
+        let source = format!(
+            "#import bindings\n{imports}@compute @workgroup_size(64)\n\
+             fn probe(@builtin(global_invocation_id) id: vec3u) {{\n\
+             if id.x >= arrayLength(&points) {{ return; }}\nlet x = points[id.x];\n\
+             results[id.x] = vec4f({expression});\n}}\n"
+        );
+        let linked =
+            Linked::from_source(&source).map_err(|error| Error::parameter("imports", error, "shader names"))?;
+        let kernel = Program::from_linked(&self.gpu, &linked)?.compile(&self.gpu, "probe", &self.of_points(params))?;
+        let camera = Camera::equirect(eye)?;
+        // At once, so that what is timed fills the device.
+        let kernel = Which::Made(Arc::new(kernel));
+        self.run_points(&kernel, &Shot::new(&camera, params, time), inputs, 1 << 20, interrupt)
+    }
+
+    fn run_points(
+        &mut self,
+        kernel: &Which,
+        shot: &Shot<'_>,
+        points: &[[f32; 4]],
+        most: usize,
+        interrupt: Interrupt<'_>,
+    ) -> Result<Vec<[f32; 4]>> {
+        let (mut rec, frame) = self.record(shot, interrupt)?;
+        points::run(&mut rec, &frame, kernel, points, most)
+    }
+
+    /// A recording in which the LUTs of a sky are bound, and its frame.
+    fn record<'a>(&'a mut self, shot: &Shot<'_>, interrupt: Interrupt<'a>) -> Result<(Recorder<'a>, Frame)> {
+        let (mut frame, params) = shot.checked(self.size, &self.quality)?;
+        frame.beams = 0;
+        self.timings = Timings::default();
+        let mut rec = Recorder::new(&self.gpu, &mut self.timings, interrupt);
+        let specialization = specialization::of_picture(&params, &self.quality, &frame, false);
+        let (quality, eye, time) = (&self.quality, shot.camera.eye, shot.time);
+        let inputs = Inputs { params: &params, quality, frame: &frame, eye, time, specialization };
+        self.luts.update(&mut rec, &inputs)?;
+        self.lut_memory = held(&rec);
+        Ok((rec, frame))
+    }
+}

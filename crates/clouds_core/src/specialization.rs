@@ -1,0 +1,66 @@
+//! What the kernels of a picture are compiled for: the values of the `override` constants of the shaders, from one table.
+
+use std::sync::Arc;
+
+use crate::frame::Frame;
+use crate::kernel::Specialization;
+use crate::params::{Params, Quality, WeatherNoise};
+use crate::passes::reproject;
+
+/// The table of a picture. `layers`: the sky and the depth are asked for too.
+pub(crate) fn of_picture(params: &Params, quality: &Quality, frame: &Frame, layers: bool) -> Arc<Specialization> {
+    let high = frame.high_clouds > 0;
+    let on = |on: bool| f64::from(u8::from(on));
+    of_sky(params, quality).with(&[
+        ("SUNLIT", on(frame.sunlit(params))),
+        ("CAMERA", f64::from(frame.camera_kind)),
+        ("BEAMS", on(frame.beams > 0)),
+        ("SCENE", on(frame.scene > 0)),
+        ("SUBRAYS", on(params.volume.is_none() && frame.has_subrays())),
+        ("SPARSE", on(frame.sparse > 0)),
+        ("STRIDE", f64::from(reproject::stride(frame.sparse > 0))),
+        ("WIDE_PHASE", on(frame.phase_samples > 1)),
+        ("HIGH", on(high)),
+        ("HIGH_EMBOSS", on(high && frame.high_emboss > 0)),
+        ("HIGH_LOW_SUN", on(high && frame.high_low_sun > 0)),
+        ("CLOUDLESS", on(frame.cloudless > 0)),
+        ("GROUND_SHADOW", on(frame.ground_shadow > 0)),
+        ("LAYERS", on(layers)),
+        ("WIDE", on(frame.sky_samples > 1)),
+    ])
+}
+
+/// The table of what is asked of a sky without a picture.
+pub(crate) fn of_points(params: &Params, quality: &Quality) -> Arc<Specialization> {
+    Arc::new(of_sky(params, quality))
+}
+
+/// The table of bakes that know no picture.
+pub(crate) fn of_bakes() -> Arc<Specialization> {
+    of_points(&Params::default(), &Quality::default())
+}
+
+fn of_sky(params: &Params, quality: &Quality) -> Specialization {
+    let on = |on: bool| f64::from(u8::from(on));
+    let light = &params.light;
+    let volume = params.volume.is_some();
+    let cheap = quality.cheap_light < 1.0 || quality.far_sample || quality.light_distance <= 0.0;
+    Specialization::new([
+        ("MODEL", f64::from(light.model as u32)),
+        ("PHASE", f64::from(light.phase as u32)),
+        ("VOLUME", on(volume)),
+        ("PRECISE", on(quality.is_precise(params))),
+        ("KEEP_CLEAR", on(params.clear_spot().1 > 0.0 && !volume)),
+        ("AIR", on(params.atmosphere.enabled)),
+        ("SUNLIT", 1.0),
+        ("RAINY", on(params.is_rainy())),
+        ("RAIN_SHAFTS", on(params.has_rain_shafts())),
+        ("UPPER", on(params.has_upper_clouds())),
+        ("BROAD_WEATHER", on(params.has_broad_weather())),
+        ("PROFILE_TABLE", on(params.clouds.profile.is_some() && !volume)),
+        ("LIGHT_DETAIL", on(quality.cheap_light > 0.0)),
+        ("LIGHT_CHEAP", on(cheap)),
+        ("WEATHER_NOISE", f64::from(WeatherNoise::WorleyPerlin as u32)),
+        ("HIGH_LOW_SUN", 0.0),
+    ])
+}

@@ -1,0 +1,110 @@
+//! What a picture is made in: buffers kept from one to the next.
+
+use crate::frame::Frame;
+use crate::gpu::Gpu;
+use crate::kernel::Bindings;
+use crate::passes::composite::{Backdrop, Composed};
+use crate::passes::march::Marched;
+use crate::passes::rays::Rays;
+use crate::passes::refine::{self, Refined};
+use crate::passes::reproject::{self, Current, Followed};
+use crate::passes::{path, reference};
+use crate::plan::Integrator;
+use crate::scene_depth::SceneTextures;
+
+/// Buffers of the strips of a still.
+pub(crate) struct StillTargets {
+    size: [u32; 2],
+    integrator: Integrator,
+    sparse: bool,
+    pub refined: Refined,
+    pub marched: Marched,
+    pub composed: Composed,
+    pub backdrop: Backdrop,
+    pub rays: Option<Rays>,
+}
+
+impl StillTargets {
+    fn new(gpu: &Gpu, size: [u32; 2], integrator: Integrator, sparse: bool) -> Self {
+        let [pixels, known] = [size, refine::known(size, sparse)].map(count);
+        let ray_bytes = match integrator {
+            Integrator::March => None,
+            Integrator::Reference => Some(reference::RAY_BYTES),
+            Integrator::Path => Some(path::RAY_BYTES),
+        };
+        Self {
+            size,
+            integrator,
+            sparse,
+            refined: Refined::new(gpu, known),
+            marched: Marched::new(gpu, known),
+            composed: Composed::new(gpu, pixels),
+            backdrop: Backdrop::new(gpu, size),
+            rays: ray_bytes.map(|bytes| Rays::new(gpu, pixels, bytes)),
+        }
+    }
+
+    /// Those of a strip: the same as before where it has room in them.
+    pub fn fit<'a>(kept: &'a mut Option<Self>, gpu: &Gpu, frame: &Frame, integrator: Integrator) -> &'a Self {
+        let (sparse, [width, rows]) = (frame.sparse > 0, [frame.width, frame.sheet_rows]);
+        let fits = |old: &Self| {
+            (old.size[0], old.integrator, old.sparse) == (width, integrator, sparse) && old.size[1] >= rows
+        };
+        if !kept.as_ref().is_some_and(fits) {
+            *kept = None;
+        }
+        kept.get_or_insert_with(|| Self::new(gpu, [width, rows], integrator, sparse))
+    }
+
+    /// What is kept on the device.
+    pub fn bindings(&self) -> Bindings {
+        let rays = self.rays.as_ref().map_or(Vec::new(), |rays| rays.bindings("rays"));
+        let Self { marched, refined, composed, backdrop, .. } = self;
+        [marched.bindings(), refined.bindings(), composed.bindings(), backdrop.bindings(), rays].concat()
+    }
+}
+
+/// Buffers of whole pictures, and what the frame before has left in them.
+pub(crate) struct TemporalTargets {
+    pub size: [u32; 2],
+    pub sparse: bool,
+    pub refined: Refined,
+    pub current: Current,
+    pub before: Followed,
+    pub now: Followed,
+    pub composed: Composed,
+    pub backdrop: Backdrop,
+    /// The user's scene in the frame before.
+    pub scene_before: SceneTextures,
+}
+
+impl TemporalTargets {
+    pub fn new(gpu: &Gpu, size: [u32; 2], sparse: bool) -> Self {
+        let known = refine::known(size, sparse);
+        let cells = reproject::cells(known, sparse);
+        let [known, cells] = [known, cells].map(count);
+        Self {
+            size,
+            sparse,
+            refined: Refined::new(gpu, known),
+            current: Current::new(gpu, cells),
+            before: Followed::new(gpu, known),
+            now: Followed::new(gpu, known),
+            composed: Composed::new(gpu, count(size)),
+            backdrop: Backdrop::new(gpu, size),
+            scene_before: SceneTextures::new(gpu, 0, false),
+        }
+    }
+
+    /// What is kept on the device.
+    pub fn bindings(&self) -> Bindings {
+        let Self { refined, current, before, now, composed, backdrop, scene_before, .. } = self;
+        let scene = vec![("scene_before", scene_before.depth())];
+        let ours = [current.bindings(), refined.bindings(), composed.bindings(), backdrop.bindings(), scene];
+        [ours.concat(), before.bindings(), now.bindings()].concat()
+    }
+}
+
+pub(crate) fn count(size: [u32; 2]) -> u64 {
+    size.map(u64::from).iter().product()
+}

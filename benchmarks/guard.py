@@ -62,9 +62,9 @@ def flight(scene: str, quality: str, size: tuple[int, int]) -> Any:
 
     renderer = nubis.Renderer(*size, quality=quality)
     frames = [np.array(frame) for frame in renderer.animate(shots())]
-    return {f"{i:02d}": frame for i, frame in enumerate(frames)} | {
-        "history": renderer.history_length
-    }
+    named = {f"{i:02d}": frame for i, frame in enumerate(frames)}
+    history = renderer.history_length
+    return named if history is None else named | {"history": history}
 
 
 def others() -> Iterator[Case]:

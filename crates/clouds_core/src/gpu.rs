@@ -29,8 +29,9 @@ pub struct AdapterInfo {
     pub pci: String,
 }
 
-/// Seconds that an invocation takes before any has been timed: of a march, on a processor and on a GPU.
-const FIRST_GUESS: [f64; 2] = [3e-6, 1e-8];
+/// Seconds that an invocation is thought to take before any has been timed, on a processor and on a GPU: ten times as long as one
+/// of a march in `draft`, as long as one in `high`.
+const FIRST_GUESS: [f64; 2] = [3e-5, 1e-7];
 /// Invocations up to which a dispatch says nothing of how long one takes: launching it takes longer.
 const TOO_FEW: f64 = 1024.0;
 /// How long one submission, meant to take a tenth of a second, may take before the device counts as hung.
@@ -386,12 +387,13 @@ impl Gpu {
         ((seconds / self.seconds_each(kernel)) as u64).max(1)
     }
 
-    /// Learns how long invocations of a kernel take: from many, and by no more than a factor of four at once.
+    /// Learns how long invocations of a kernel take: from many, and by no more than a factor of four at once after the first time.
     pub(crate) fn learn(&self, kernel: &str, invocations: f64, seconds: f64) {
         if invocations >= TOO_FEW && seconds > 0.0 {
-            let old = self.seconds_each(kernel);
-            let each = (seconds / invocations).clamp(old / 4.0, old * 4.0);
-            lock(&self.costs).insert(kernel.to_owned(), each);
+            let mut costs = lock(&self.costs);
+            let each = seconds / invocations;
+            let each = costs.get(kernel).map_or(each, |old| each.clamp(old / 4.0, old * 4.0));
+            costs.insert(kernel.to_owned(), each);
         }
     }
 

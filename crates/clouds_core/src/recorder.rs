@@ -17,19 +17,18 @@ use crate::error::Result;
 use crate::gpu::{COPIED, Download, Gpu, Interrupt, Timings, mips, texture_bytes};
 use crate::kernel::{Binding, Bindings, Kernel, Name, Resources, Specialization};
 
-/// Longest that one submission may keep the device busy, s, where its lists are as long as they can be: half of the two seconds
-/// after which Windows resets a device.
-const SLICE_SECONDS: f64 = 1.0;
+/// Longest that one submission usually keeps the device busy, s, and that one dispatch does whose list is as long as it can be: a
+/// fourth of the two seconds after which Windows resets a device. After Ctrl-C two of them go on.
+const SLICE_SECONDS: f64 = 0.5;
 /// The uniform block that differs from slice to slice.
 const PER_DISPATCH: &str = "frame";
 /// Most workgroups along one side of a dispatch (WebGPU's default limit).
 const MOST_GROUPS: u32 = 65_535;
 /// What uniform blocks are aligned to, bytes (WebGPU's default limit).
 const ALIGNED: usize = 256;
-/// Bytes from the arguments of one indirect dispatch to those of the next: each can be bound as a uniform.
+/// Bytes from the arguments of one indirect dispatch to those of the next, which are workgroups along each side and how many
+/// invocations the whole list has: each can be bound as a uniform.
 const ARGUMENT_STRIDE: u64 = ALIGNED as u64;
-/// Bytes of them: workgroups along each side, and how many invocations the whole list has.
-const ARGUMENT_BYTES: u64 = 16;
 /// Invocations of a workgroup of a list, and along the sides of one of a conditional grid (arrange.wgsl).
 const LIST_GROUP: u32 = 64;
 const GRID_GROUP: u32 = 8;
@@ -47,6 +46,8 @@ pub(crate) struct List<'a> {
     pub most: u32,
     /// Invocations for each entry.
     pub each: u32,
+    /// Share of those entries that it has as a rule.
+    pub likely: f64,
 }
 
 /// What a dispatch runs.
@@ -62,8 +63,8 @@ pub(crate) enum Which {
 #[derive(Clone, Copy)]
 enum Extent {
     Grid([u32; 3]),
-    /// By the arguments of this number, at most so many.
-    Indirect(u32, u64),
+    /// By the arguments of this number, as a rule so many.
+    Indirect(u32, f64),
 }
 
 enum Step {
@@ -166,7 +167,7 @@ impl<'a> Recorder<'a> {
             ("arguments", Binding::Arguments(argument..argument + 1)),
         ];
         self.push(Which::Named(("arrange", "arrange_grid"), Arc::default()), ours, Extent::Grid([1; 3]));
-        self.push(which, bindings, Extent::Indirect(argument, u64::from(extent[0]) * u64::from(extent[1])));
+        self.push(which, bindings, Extent::Indirect(argument, 0.0));
     }
 
     /// Runs a kernel over `rows` rows of `width` invocations, in slices where it may take long, each with the uniform block
@@ -217,8 +218,10 @@ impl<'a> Recorder<'a> {
             let argument = first + slice;
             let ours = [(PER_DISPATCH, block(slice * most)), ("listed", Binding::Arguments(argument..argument + 1))];
             let which = Which::Named(name, self.specialization.clone());
-            let most = u64::from(most.min(invocations - slice * most));
-            self.push(which, [&ours, bindings.as_slice()].concat(), Extent::Indirect(argument, most));
+            // Under a condition it is as a rule empty.
+            let likely = if self.condition.is_some() { 0.0 } else { list.likely * f64::from(invocations) };
+            let likely = (likely - f64::from(slice * most)).clamp(0.0, most.into());
+            self.push(which, [&ours, bindings.as_slice()].concat(), Extent::Indirect(argument, likely));
         }
     }
 
@@ -411,7 +414,7 @@ impl<'a> Submission<'a> {
                 self.gpu.kernel(*name, specialization)?
             }
         };
-        let seconds = extent.most() as f64 * self.gpu.seconds_each(&kernel.label);
+        let seconds = extent.likely() * self.gpu.seconds_each(&kernel.label);
         if self.seconds > 0.0 && self.seconds + seconds > SLICE_SECONDS {
             let before = self.in_flight.take();
             self.submit();
@@ -489,10 +492,10 @@ impl<'a> Submission<'a> {
         let arguments: &[u32] = ours[0].numbers();
         let invocations = |extent: Extent| match extent {
             Extent::Grid(size) => size.map(f64::from).iter().product::<f64>(),
-            Extent::Indirect(argument, most) => {
+            Extent::Indirect(argument, _) => {
                 let at = (ARGUMENT_STRIDE / 4 * u64::from(argument)) as usize;
                 let groups = arguments[at..at + 3].iter().map(|n| f64::from(*n)).product::<f64>();
-                (groups * f64::from(LIST_GROUP)).min(most as f64)
+                groups * f64::from(LIST_GROUP)
             }
         };
         let Some((ticks, period)) = ours.get(1).zip(self.gpu.nanoseconds_per_tick) else {
@@ -518,11 +521,11 @@ impl<'a> Submission<'a> {
 }
 
 impl Extent {
-    /// Most invocations that it can have.
-    fn most(self) -> u64 {
+    /// How many invocations it has as a rule.
+    fn likely(self) -> f64 {
         match self {
-            Self::Grid(size) => size.map(u64::from).iter().product(),
-            Self::Indirect(_, most) => most,
+            Self::Grid(size) => size.map(f64::from).iter().product(),
+            Self::Indirect(_, likely) => likely,
         }
     }
 }

@@ -11,6 +11,9 @@ use crate::recorder::Recorder;
 /// Pixels of a cell in each direction (as in lattice.wgsl).
 pub(crate) const TILE: u32 = COARSEST;
 
+/// Share of the cells that are not smooth as a rule.
+const ROUGH: f64 = 0.3;
+
 /// What a picture is composed of, and into.
 pub(crate) struct Parts<'a> {
     pub marched: &'a Marched,
@@ -86,7 +89,7 @@ pub(crate) fn record(rec: &mut Recorder<'_>, frame: &Frame, params: &Params, par
         rec.clear(&refined.count);
         let cells = [block, backdrop.bindings(), ours.clone()].concat();
         rec.dispatch(("composite", "composite_cells"), cells, [columns, rows, 1]);
-        let list = refined.list(columns * rows, TILE * TILE);
+        let list = refined.list(columns * rows, TILE * TILE, ROUGH);
         rec.dispatch_list(("composite", "composite_list"), &ours, &list, |first_ray| {
             Frame { first_ray, ..frame.clone() }.block(gpu)
         });

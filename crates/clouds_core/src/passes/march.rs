@@ -47,22 +47,27 @@ pub(crate) fn record(rec: &mut Recorder<'_>, frame: &Frame, quality: &Quality, r
     }
     let mut frame = Frame { lattice: refine::coarsest(frame, quality), ..frame.clone() };
     refine::begin(rec, &frame, refined);
+    let mut likely = 1.0;
     loop {
-        list(rec, &frame, refine::pixels(&frame), refined, out);
+        list(rec, &frame, refine::pixels(&frame), likely, refined, out);
         if frame.lattice == 1 {
             return;
         }
         refine::record(rec, &frame, refined, out);
         frame.lattice /= 2;
         frame.spans = 1;
+        likely = REFINED;
     }
 }
 
-/// Marches the listed pixels, of which there are `most` at most.
-pub(crate) fn list(rec: &mut Recorder<'_>, frame: &Frame, most: u32, refined: &Refined, out: &Marched) {
+/// Share of the pixels of a finer lattice that are listed as a rule: in stills of eleven scenes an eighth to a fifth.
+const REFINED: f64 = 0.2;
+
+/// Marches the listed pixels, of which there are `most` at most, and as a rule a share of them.
+pub(crate) fn list(rec: &mut Recorder<'_>, frame: &Frame, most: u32, likely: f64, refined: &Refined, out: &Marched) {
     let gpu = rec.gpu;
     let bindings = [out.bindings(), refined.bindings()].concat();
-    rec.dispatch_list(("march", "march_list"), &bindings, &refined.list(most, 1), |first_ray| {
+    rec.dispatch_list(("march", "march_list"), &bindings, &refined.list(most, 1, likely), |first_ray| {
         Frame { first_ray, ..frame.clone() }.block(gpu)
     });
 }

@@ -66,9 +66,9 @@ impl Refined {
         ]
     }
 
-    /// The list, of at most so many entries with so many invocations each.
-    pub fn list(&self, most: u32, each: u32) -> List<'_> {
-        List { count: &self.count, most, each }
+    /// The list, of at most so many entries with so many invocations each, and as a rule a share of them.
+    pub fn list(&self, most: u32, each: u32, likely: f64) -> List<'_> {
+        List { count: &self.count, most, each, likely }
     }
 }
 

@@ -168,7 +168,7 @@ pub(crate) fn record(rec: &mut Recorder<'_>, frame: &Frame, quality: &Quality, i
     let most = if refine::is_needed(&listed, quality) { MOST_LISTED * pixels as f32 } else { f32::MAX };
     let ours = [current.own(), refined.bindings(), vec![("most_listed", Binding::block(&[most.to_bits(), 0, 0, 0]))]];
     rec.dispatch(("reproject", "choose"), ours.concat(), [1; 3]);
-    march::list(rec, &listed, pixels, refined, &now.marched);
+    march::list(rec, &listed, pixels, MOST_LISTED.into(), refined, &now.marched);
     rec.when(&current.still, |rec| begin(rec, frame, quality, refined, now));
 }
 

@@ -601,10 +601,6 @@ class Quality(Block):
         Share of a pixel's cloud that is lit as one, by the light samples of one place in it:
         samples in a row are lit together once they have gathered more. 0 lights each sample by
         itself. Allowed: a number from 0 to 1.
-    sun_volume : bool
-        Whether the light samples stay within two cells of a volume, baked around the eye, of
-        sunlight through the clouds, and the rest is read there. Not in a grid. Allowed: True or
-        False.
     light_distance : float
         How far the light samples reach; 0 spreads them to where the clouds end. Allowed: a number
         from 0 to 100000 m.
@@ -650,7 +646,6 @@ class Quality(Block):
     empty_samples: int = 6
     light_steps: int = 16
     light_share: float = 0.15
-    sun_volume: bool = False
     light_distance: float = 0.0
     far_sample: bool = False
     cone: float = 0.0

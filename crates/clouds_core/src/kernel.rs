@@ -139,9 +139,7 @@ impl Variant {
             subrays: false,
             sparse: false,
             light_detail: quality.cheap_light > 0.0,
-            light_cheap: quality.cheap_light < 1.0
-                || quality.far_sample
-                || quality.light_distance <= 0.0,
+            light_cheap: quality.cheap_light < 1.0 || quality.far_sample || quality.light_distance <= 0.0,
             // What single passes ask for beside.
             camera: 0,
             high: false,

@@ -31,7 +31,6 @@ TEXTURES = (
     "shape_noise",
     "curl_noise",
     "detail_noise",
-    "sun_volume",
 )
 
 Counts = npt.NDArray[np.uint32]
@@ -67,21 +66,19 @@ def counting_shaders(folder: Path) -> None:
     """Copy the shaders into a folder, and make each read of the clouds' textures count itself."""
     source = Path(os.environ.get("NUBIS_SHADERS") or ROOT / "shaders" / "wgsl")
     shutil.copytree(source, folder, dirs_exist_ok=True)
-    found = []
-    for name in "density", "sun_volume":
-        path = folder / f"{name}.wgsl"
-        lines = []
-        for line in path.read_text().splitlines():
-            indent = line[: len(line) - len(line.lstrip())]
-            if line.strip() == "evaluations += 1u;":
-                line = f"{indent}evaluations += u32(quality.path_samples <= {_EVALUATIONS}u);"
-            for texture in re.findall(r"textureSampleLevel\((\w+)", line):
-                found.append(texture)
-                chosen = _EVALUATIONS + found.index(texture) + 1
-                counts = f"quality.path_samples == {chosen}u || quality.path_samples == {_ALL + 1}u"
-                lines.append(f"{indent}evaluations += u32({counts});")
-            lines.append(line)
-        path.write_text("\n".join(lines) + "\n")
+    found, lines = [], []
+    path = folder / "density.wgsl"
+    for line in path.read_text().splitlines():
+        indent = line[: len(line) - len(line.lstrip())]
+        if line.strip() == "evaluations += 1u;":
+            line = f"{indent}evaluations += u32(quality.path_samples <= {_EVALUATIONS}u);"
+        for texture in re.findall(r"textureSampleLevel\((\w+)", line):
+            found.append(texture)
+            chosen = _EVALUATIONS + found.index(texture) + 1
+            counts = f"quality.path_samples == {chosen}u || quality.path_samples == {_ALL + 1}u"
+            lines.append(f"{indent}evaluations += u32({counts});")
+        lines.append(line)
+    path.write_text("\n".join(lines) + "\n")
     if tuple(found) != TEXTURES:
         raise ValueError(f"the clouds read {found}, where {TEXTURES} are counted")
 

@@ -692,12 +692,10 @@ def memory(found: Row) -> str:
     width, height = found["header"]["size"]
     lines = [(f"`{name}`", owner, _bytes(size)) for owner, name, size in held]
     total = {o: sum(size for owner, _, size in held if owner == o) for o in ("scene", "still")}
-    volume = sum(s for owner, n, s in found["memory_with_sun_volume"] if owner == "scene")
     return (
         _table(["texture or buffer", "of", "bytes"], lines)
-        + f"\n\nWhat every picture reads (scene): {_megabytes(total['scene'])}, with the sun "
-        f"volume {_megabytes(volume)}. Buffers of the frame itself (still) at {width}×{height}: "
-        f"{_megabytes(total['still'])}."
+        + f"\n\nWhat every picture reads (scene): {_megabytes(total['scene'])}. Buffers of the "
+        f"frame itself (still) at {width}×{height}: {_megabytes(total['still'])}."
     )
 
 

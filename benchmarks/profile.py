@@ -38,7 +38,7 @@ def read_costs(repeats: int = 10) -> dict[str, float] | None:
     Neighbours read neighbouring texels, and rays go on by about a texel, as in a march of near
     clouds. The finest mips are read. The best of `repeats` counts, less that of an empty loop.
     """
-    renderer = nubis.Renderer(1, 1, quality=nubis.quality("balanced").replace(sun_volume=True))
+    renderer = nubis.Renderer(1, 1)
     software = renderer.adapter.kind == "cpu"
     rays, reads = (1 << 14 if software else 1 << 19), 512
     rng = np.random.default_rng(1)
@@ -104,13 +104,6 @@ def frame(scene: str, quality: str, size: Size, repeats: int) -> Row:
     }
 
 
-def memory(quality: nubis.Quality) -> list[tuple[str, str, int]]:
-    """What a renderer holds after one small picture."""
-    renderer = nubis.Renderer(16, 16, quality=quality)
-    renderer.render(*nubis.scenes["fair_weather"])
-    return renderer._core.memory()
-
-
 def main(arguments: Sequence[str] | None = None) -> None:
     """Measure, print, write the results, and bring docs/speed.md up to date."""
     parser = argparse.ArgumentParser(
@@ -138,7 +131,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
             "header": measure.header(command) | {"size": size, "frames": args.repeats},
             "load": os.getloadavg()[0] if hasattr(os, "getloadavg") else None,
             "read_ns": read_costs(),
-            "memory_with_sun_volume": memory(nubis.quality(args.quality).replace(sun_volume=True)),
             "frames": [frame(s, args.quality, size, args.repeats) for s in args.scenes],
         }
     args.out.parent.mkdir(parents=True, exist_ok=True)

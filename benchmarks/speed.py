@@ -37,7 +37,6 @@ OURS = {
     ),
     "draft": nubis.quality("draft"),
     "balanced": nubis.quality("balanced"),
-    "balanced, sun volume": nubis.quality("balanced").replace(sun_volume=True, light_steps=3),
     "balanced, finer": nubis.quality("balanced").replace(
         steps_zenith=161, steps_horizon=384, big_step=6, light_share=0.1, contrast=0.2
     ),

@@ -287,7 +287,7 @@ def test_reads_are_counted():
     assert (day["weather_map"] == day["evaluations"]).all()
     assert (day["shape_noise"] == day["evaluations"]).all()
     assert (day["curl_noise"] == day["detail_noise"]).all()
-    assert not any(day[name].any() for name in ("sun_volume", "broad_map", "profile_table"))
+    assert not any(day[name].any() for name in ("broad_map", "profile_table"))
     broad = [counts.Job(*FAIR, quality, kind) for kind in ("evaluations", "broad_map")]
     assert np.array_equal(*counts.count(broad, (48, 27)))
     # Five full light samples of four reads and a far one of two at each lit step.
@@ -342,8 +342,8 @@ def test_no_optimisation_costs_more(panels):
         assert panels[after].mean() < panels[before].mean(), after
     assert panels[big[1]].mean() < panels[big[0]].mean()
     for name in "draft", "balanced":
-        all_rays, some, volume = (panels[n].mean() for n in names if n.startswith(name))
-        assert volume < some < all_rays
+        all_rays, some = (panels[n].mean() for n in names if n.startswith(name))
+        assert some < all_rays
         assert (panels[name] == 0).mean() > (panels[f"{name}, a ray for each pixel"] == 0).mean()
 
 
@@ -395,11 +395,11 @@ def test_a_frame_without_timestamps():
     frame = {
         "scene": "x", "quality": "draft", "ms": 2.0, "first_ms": 3.0, "passes_ms": {},
         "march_ms": 0, "bakes_ms": {}, "evaluations": 5.0,
-        "reads": {"weather_map": 5.0, "sun_volume": 0.0},
+        "reads": {"weather_map": 5.0, "broad_map": 0.0},
     }  # fmt: skip
     header = {"size": [8, 8], "adapter": {"kind": "discrete"}}
     text = page.profile({"header": header, "read_ns": None, "frames": [frame]})
-    assert "| `weather_map` | 5.0 | – | – |" in text and "sun_volume" not in text
+    assert "| `weather_map` | 5.0 | – | – |" in text and "broad_map" not in text
     assert "ns each" not in text and "would take" not in text
 
 
@@ -407,11 +407,9 @@ def held(renderer, owner):
     return {name: size for o, name, size in renderer._core.memory() if o == owner}
 
 
-@pytest.mark.parametrize("sun_volume", [False, True])
-def test_memory(sun_volume):
+def test_memory():
     """What every picture reads is under 64 MB; what grows with the picture is counted apart."""
-    quality = nubis.quality("balanced").replace(sun_volume=sun_volume)
-    renderer = nubis.Renderer(96, 54, quality=quality)
+    renderer = nubis.Renderer(96, 54)
     assert renderer._core.memory() == []
     renderer.render(*FAIR)
     scene, still = held(renderer, "scene"), held(renderer, "still")
@@ -419,13 +417,12 @@ def test_memory(sun_volume):
     # One half float a texel.
     assert scene["shape_noise"] == 2 * 128**3
     assert scene["weather_map"] == 8 * 512**2
-    assert scene["sun_volume"] == (8 * 96 * 96 * 144 if sun_volume else 8)
     bytes_a_pixel = {"clouds": 16, "image": 16, "sky": 16, "cloud_span": 8}
     bytes_a_pixel |= {n: 4 for n in ("cloud_depth", "samples", "active_rays", "depth")}
     # Corners of cells of 4 x 4 pixels, and one more around them all: four times four numbers each.
     few = {"ray_count": 16, "corners": 64 * (96 // 4 + 3) * (56 // 4 + 3)}
     assert still == {n: 96 * 54 * b for n, b in bytes_a_pixel.items()} | few
-    bigger = nubis.Renderer(192, 108, quality=quality)
+    bigger = nubis.Renderer(192, 108)
     bigger.render(*FAIR)
     # A ray for each pixel and one more, until they are a degree apart.
     assert scene.pop("beams") == 8 * 97 * 55 * 32

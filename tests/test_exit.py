@@ -79,7 +79,9 @@ def test_the_interpreter_ends(end):
 
 
 def test_an_interrupt_while_threads_render():
-    code = f"{START}\nimport signal\nstart(render, animate)\nsignal.raise_signal(signal.SIGINT)"
+    # A job in the background is started with interrupts ignored.
+    listen = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
+    code = f"{START}\n{listen}\nstart(render, animate)\nsignal.raise_signal(signal.SIGINT)"
     done = _run(code)
     assert done.stderr.strip().endswith("KeyboardInterrupt") and "panic" not in done.stderr
     assert done.returncode in (1, 130, -2)

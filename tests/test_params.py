@@ -409,14 +409,24 @@ def test_unknown_names_and_wrong_groups(change, named):
     assert named in str(error.value)
 
 
-def test_fields_of_older_versions():
-    """What is gone is named with the reason, in calls and in pickles."""
-    with pytest.raises(ParameterError, match=r"Quality\.view_distance = 4.* horizon"):
-        Quality().replace(view_distance=4e5)
+@pytest.mark.parametrize(
+    ("field", "value", "why"), [("view_distance", 4e5, "horizon"), ("sun_volume", True, "balanced")]
+)
+def test_fields_of_older_versions(tmp_path, field, value, why):
+    """What is gone is named with the reason, in calls, pickles and files."""
+    named = rf"{field} = {value} is not allowed: it is gone, as .*{why}"
+    with pytest.raises(ParameterError, match=rf"Quality\.{named}"):
+        Quality().replace(**{field: value})
+    with pytest.raises(ParameterError, match=rf"Quality\({field}=\.\.\.\) .* gone, as .*{why}"):
+        Quality(**{field: value})
     old = copy.copy(Quality())
-    object.__setattr__(old, "view_distance", 4e5)
-    with pytest.raises(ParameterError, match=r"Quality\.view_distance = 4.* horizon"):
+    object.__setattr__(old, field, value)
+    with pytest.raises(ParameterError, match=rf"Quality\.{named}"):
         pickle.loads(pickle.dumps(old))
+    path = tmp_path / "sky.toml"
+    path.write_text(f"[quality]\n{field} = {str(value).lower()}\n")
+    with pytest.raises(ParameterError, match=rf"quality\.{named}"):
+        Params.load(path)
 
 
 @pytest.mark.parametrize("top", [1000.0, 999.0])

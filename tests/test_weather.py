@@ -408,13 +408,15 @@ class TestMixtures:
         ]:
             np.testing.assert_array_equal(renderer().density(points, params), want[same])
 
-    @pytest.mark.parametrize("method", ["path", "sun_volume"])
-    def test_what_is_baked_from_the_map_follows(self, renderer, rng, method):
-        """Majorants, and the sun volume: as on a renderer that has seen no other mixture."""
+    @pytest.mark.parametrize("method", ["path", "shadows"])
+    def test_what_is_baked_from_the_map_follows(self, method):
+        """Majorants, and shadows on ground and air: as on a renderer that has seen no other
+        mixture.
+        """
         a, b = (
             0.3 * part + least for part, least in zip(maps(2, (16, 16)), (0.3, 0.7), strict=True)
         )
-        quality = nubis.quality("draft").replace(path_samples=8, sun_volume=method == "sun_volume")
+        quality = nubis.quality("draft").replace(path_samples=8)
         sky = Params(weather=Weather(map=a, extent=20_000.0)).with_(**{"clouds.coverage": 0.6})
         if method == "path":
             sky = sky.with_(**{"light.model": "path"})

@@ -309,8 +309,9 @@ def test_an_animation_of_a_wandering_wind_stays_near_the_still(renderer):
 
 @pytest.mark.parametrize("wander", [{}, {"wander.wind": 1.0}], ids=["steady", "wandering"])
 def test_shadows_drift_with_the_wind(wander):
-    """The sun volume is baked every 25 m of the fastest that the wind may blow, and read where it
-    has drifted to since: half way between the weather and the shapes.
+    """Those on the ground are baked every 600 m of the eye's way and every 32 m of the fastest that
+    the wind may blow, and read where they have drifted to since: half way between the weather and
+    the shapes.
     """
     params = nubis.Params().with_(
         **wander,
@@ -324,15 +325,18 @@ def test_shadows_drift_with_the_wind(wander):
             shape + noise_twin.blown(params, wind.weather_direction, wind.weather_speed, time)
         )
 
-    period = 25.0 / (20.0 * (1.0 + params.wander.wind))
+    period = 32.0 / (20.0 * (1.0 + params.wander.wind))
     for time in (0.0, 0.6, 333.3, 5000.1, MONTH + 0.4):
         baked = np.floor(time / period) * period
-        got = probe(
-            "vec4f(frame.sun_volume_eye, 0.0, 0.0)",
-            [0.0],
-            imports=["bindings"],
-            params=params,
-            time=time,
-        )[0, :2]
-        np.testing.assert_allclose(got, drift(baked) - drift(time), atol=1e-5)
-        assert np.linalg.norm(got) <= 25.0
+        for eye, place in [((0.0, 0.0), (0.0, 0.0)), ((299.0, -1510.0), (0.0, -1800.0))]:
+            got = probe(
+                "vec4f(frame.shadow_eye, 0.0, 0.0)",
+                [0.0],
+                imports=["bindings"],
+                params=params,
+                eye=(*eye, 100.0),
+                time=time,
+            )[0, :2]
+            gone = got - np.subtract(eye, place)
+            np.testing.assert_allclose(gone, drift(baked) - drift(time), atol=3e-5)
+            assert np.linalg.norm(gone) <= 32.0

@@ -15,7 +15,7 @@ import numpy as np
 
 from nubis import _nubis
 from nubis._errors import FileError, ParameterError
-from nubis._names import refuse_arguments, unknown
+from nubis._names import refuse_arguments, unknown_field
 from nubis._nubis import DensityGrid
 
 
@@ -354,12 +354,5 @@ def _grid(fields: Mapping[str, Any]) -> DensityGrid:
     return DensityGrid(fields["extinction"], fields["bounds"])
 
 
-# Fields that there are no more, and why.
-GONE = {"view_distance": "clouds are drawn to the horizon from any altitude"}
-
-
 def _unknown(path: str, value: Any, names: list[str]) -> ParameterError:
-    gone = GONE.get(path.rpartition(".")[2])
-    allowed = f"{gone}; a field that there is" if gone else "a field that there is"
-    words = unknown(f"{path} = {value!r}", path, names, f"{allowed}, one of")
-    return ParameterError(words)
+    return ParameterError(unknown_field(f"{path} = {value!r}", path, names))

@@ -10,6 +10,12 @@ from nubis._errors import ParameterError
 
 Value = TypeVar("Value")
 
+# Fields that there are no more, and why.
+GONE = {
+    "sun_volume": 'nubis.quality("balanced") takes less time and, but for storms, errs less',
+    "view_distance": "clouds are drawn to the horizon from any altitude",
+}
+
 
 class UnknownKeyError(ParameterError, KeyError):
     """A name that a table of the package does not have."""
@@ -27,6 +33,14 @@ def unknown(name: str, given: str, names: Iterable[str], what: str = "one of") -
     near = difflib.get_close_matches(given.lower(), known, n=1)
     hint = f"; did you mean {near[0]!r}?" if near else ""
     return f"{name} is not allowed: it must be {what} {', '.join(known)}{hint}"
+
+
+def unknown_field(name: str, given: str, names: Iterable[str]) -> str:
+    """The same for a field, whose path is `given`."""
+    known = list(names)
+    if why := GONE.get(given.rpartition(".")[2]):
+        return f"{name} is not allowed: it is gone, as {why}; it must be one of {', '.join(known)}"
+    return unknown(name, given, known, "a field that there is, one of")
 
 
 class Named(Mapping[str, Value]):
@@ -63,5 +77,4 @@ def refuse_arguments(kind: str, given: Iterable[str], names: Iterable[str]) -> N
     known = list(names)
     for name in given:
         if name not in known:
-            words = unknown(f"{kind}({name}=...)", name, known, "a field, one of")
-            raise UnknownArgumentError(words)
+            raise UnknownArgumentError(unknown_field(f"{kind}({name}=...)", name, known))

@@ -17,7 +17,7 @@ const TURNS: i32 = 4;
 /// follows from the others, and they never come round together. (The golden and the plastic number have such sums.) The
 /// fastest takes two thirds of `wander.period`, the slowest half as long again.
 const RATIO: f64 = 1.316_074_012_952_492_5;
-/// Steps of a swing of the cover: each is a new sun volume and new majorants, and changes no pixel that one would see.
+/// Steps of a swing of the cover: each is new shadows and new majorants, and changes no pixel that one would see.
 const COVER_STEPS: f64 = 1024.0;
 
 /// What the phases of the wind and of the cover are drawn for.

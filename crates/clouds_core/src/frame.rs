@@ -7,12 +7,12 @@ use std::f64::consts::{FRAC_PI_2, PI as PI64};
 use glam::{DVec2, DVec3, Vec3};
 
 use crate::camera::{Camera, Projection};
-use crate::moon::MOON_RADIUS;
-use crate::params;
-use crate::params::{Edge, Model, Params, Phase};
 use crate::gpu::Gpu;
 use crate::kernel::Binding;
 use crate::luts::{broad_weather, shadow};
+use crate::moon::MOON_RADIUS;
+use crate::params;
+use crate::params::{Edge, Model, Params, Phase};
 use crate::passes::refine;
 use crate::schema::{self, Block as _};
 use crate::wind::Carried;

@@ -171,7 +171,7 @@ pub struct Gpu {
     /// What renderers share, one of each type.
     shared: Mutex<HashMap<TypeId, Arc<dyn Any + Send + Sync>>>,
     programs: Mutex<HashMap<&'static str, Arc<Program>>>,
-    kernels: Mutex<HashMap<Key, Slot>>,
+    kernels: Mutex<Kernels>,
     /// Seconds that an invocation takes, by kernel.
     costs: Mutex<HashMap<String, f64>>,
     submissions: AtomicU64,
@@ -217,6 +217,27 @@ fn nothing(device: &wgpu::Device, dimension: wgpu::TextureDimension) -> wgpu::Te
 
 /// A kernel that is there, or is being compiled by whoever holds the lock.
 type Slot = Arc<Mutex<Option<Arc<Kernel>>>>;
+
+/// The kernels of a device, each with the number of its last use.
+#[derive(Default)]
+struct Kernels {
+    slots: HashMap<Key, (Slot, u64)>,
+    uses: u64,
+}
+
+/// Most kernels that are kept: on lavapipe one takes 2 to 3 MB, and a picture has ten to thirty.
+const MOST_KERNELS: usize = 96;
+
+impl Kernels {
+    /// Forgets those whose last use is longest ago, where there are too many.
+    fn forget(&mut self) {
+        while self.slots.len() > MOST_KERNELS {
+            let Some(oldest) = self.slots.iter().min_by_key(|(_, (_, last_use))| *last_use) else { return };
+            let key = oldest.0.clone();
+            self.slots.remove(&key);
+        }
+    }
+}
 
 #[derive(Default)]
 struct Failure {
@@ -316,7 +337,8 @@ impl Gpu {
             clamp_sampler: sampler("clamp_sampler", wgpu::AddressMode::ClampToEdge),
             mirror_sampler: sampler("mirror_sampler", wgpu::AddressMode::MirrorRepeat),
             max_buffer: offered.max_storage_buffer_binding_size.min(offered.max_buffer_size),
-            nothing: [wgpu::TextureDimension::D2, wgpu::TextureDimension::D3].map(|dimension| nothing(&device, dimension)),
+            nothing: [wgpu::TextureDimension::D2, wgpu::TextureDimension::D3]
+                .map(|dimension| nothing(&device, dimension)),
             shared: Mutex::default(),
             programs: Mutex::default(),
             kernels: Mutex::default(),
@@ -345,7 +367,13 @@ impl Gpu {
     fn slot(&self, name: Name, specialization: &Specialization) -> Result<(Arc<Program>, Slot)> {
         let program = self.program(name.0)?;
         let key = program.key(name, specialization)?;
-        let slot = lock(&self.kernels).entry(key).or_default().clone();
+        let mut kernels = lock(&self.kernels);
+        let use_number = kernels.uses;
+        kernels.uses += 1;
+        let (slot, last_use) = kernels.slots.entry(key).or_default();
+        *last_use = use_number;
+        let slot = slot.clone();
+        kernels.forget();
         Ok((program, slot))
     }
 
@@ -409,7 +437,7 @@ impl Gpu {
             Linked::new(name).and_then(|linked| linked.parse().map(drop)).map_err(Error::File)?;
         }
         lock(&self.programs).clear();
-        lock(&self.kernels).clear();
+        lock(&self.kernels).slots.clear();
         Ok(())
     }
 

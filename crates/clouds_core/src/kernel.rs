@@ -6,8 +6,10 @@ use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
 use std::sync::Arc;
 
-use wgpu::naga::{AddressSpace, Block, Expression, Function, Handle, ImageDimension, Module, Override, Statement, TypeInner};
 use wgpu::naga::valid::ModuleInfo;
+use wgpu::naga::{
+    AddressSpace, Block, Expression, Function, Handle, ImageDimension, Module, Override, Statement, TypeInner,
+};
 
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
@@ -96,6 +98,7 @@ impl Specialization {
     }
 
     /// The names of the constants.
+    #[cfg(test)]
     pub fn names(&self) -> impl Iterator<Item = &'static str> {
         self.0.iter().map(|(name, _)| *name)
     }
@@ -301,7 +304,11 @@ impl Kernel {
         for Variable { name, number, dimension } in &self.variables {
             let given = bindings.iter().find(|(given, _)| given == name).map(|(_, binding)| binding);
             let part = |buffer, offset, size| {
-                wgpu::BindingResource::Buffer(wgpu::BufferBinding { buffer, offset, size: std::num::NonZero::new(size) })
+                wgpu::BindingResource::Buffer(wgpu::BufferBinding {
+                    buffer,
+                    offset,
+                    size: std::num::NonZero::new(size),
+                })
             };
             let resource = match (given, name.as_str(), dimension) {
                 (Some(Binding::Buffer(buffer)), ..) => buffer.as_entire_binding(),

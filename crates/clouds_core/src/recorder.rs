@@ -75,6 +75,9 @@ enum Step {
     CopyTexture { texture: wgpu::Texture, staging: wgpu::Buffer },
 }
 
+/// A kernel, and the table that it is compiled for.
+type Wanted = (Name, Arc<Specialization>);
+
 /// What is done with bytes that have come back.
 type Received = Box<dyn FnOnce(&[u8])>;
 
@@ -88,6 +91,8 @@ pub(crate) struct Recorder<'a> {
     condition: Option<wgpu::Buffer>,
     steps: Vec<Step>,
     arguments: u32,
+    /// Kernels that the next recordings may ask for.
+    ahead: Vec<Wanted>,
     downloads: Vec<Download>,
     received: Vec<(usize, Received)>,
     token: Token,
@@ -105,6 +110,7 @@ impl<'a> Recorder<'a> {
             condition: None,
             steps: Vec::new(),
             arguments: 0,
+            ahead: Vec::new(),
             downloads: Vec::new(),
             received: Vec::new(),
             token: Token::default(),
@@ -192,13 +198,7 @@ impl<'a> Recorder<'a> {
     /// Runs a kernel over the entries of a list, as many as there will be, in slices where it may take long. The list is empty
     /// afterwards. `block` makes the uniform block [`PER_DISPATCH`] for the number of the first invocation; `listed` holds the
     /// number of all.
-    pub fn dispatch_list(
-        &mut self,
-        name: Name,
-        bindings: &Bindings,
-        list: &List<'_>,
-        block: impl Fn(u32) -> Binding,
-    ) {
+    pub fn dispatch_list(&mut self, name: Name, bindings: &Bindings, list: &List<'_>, block: impl Fn(u32) -> Binding) {
         let invocations = list.most * list.each;
         let most = self.gpu.most_invocations(name.1, SLICE_SECONDS) / u64::from(LIST_GROUP) * u64::from(LIST_GROUP);
         let most = most.clamp(LIST_GROUP.into(), (LIST_GROUP * MOST_GROUPS).into()) as u32;
@@ -236,6 +236,14 @@ impl<'a> Recorder<'a> {
         // What the dispatch has of its own comes first.
         let bindings = [bindings, self.scope.clone()].concat();
         self.steps.push(Step::Dispatch { which, bindings, extent });
+    }
+
+    /// Records what `record` does only to compile its kernels: the next picture finds them.
+    pub fn compile_ahead(&mut self, record: impl FnOnce(&mut Self)) {
+        let (steps, arguments) = (mem::take(&mut self.steps), self.arguments);
+        record(self);
+        self.ahead.extend(wanted(&self.steps));
+        (self.steps, self.arguments) = (steps, arguments);
     }
 
     /// Fills a buffer with zeros.
@@ -285,7 +293,8 @@ impl<'a> Recorder<'a> {
         let mut downloads = mem::take(&mut self.downloads);
         let arguments = mem::take(&mut self.arguments);
         let mut submission = Submission::new(self.gpu, &steps, arguments, self.interrupt);
-        compiling(self.gpu, &steps, || steps.iter().try_for_each(|step| submission.encode(step)))?;
+        let wanted = wanted(&steps).into_iter().chain(mem::take(&mut self.ahead));
+        compiling(self.gpu, wanted, || steps.iter().try_for_each(|step| submission.encode(step)))?;
         submission.finish(&mut downloads, self.timings)?;
         token.0.store(true, Ordering::Relaxed);
         // From the last to the first, so that those before keep their places.
@@ -296,20 +305,28 @@ impl<'a> Recorder<'a> {
     }
 }
 
-/// Does `work` while the kernels that steps name are compiled on other threads.
-fn compiling<T>(gpu: &Gpu, steps: &[Step], work: impl FnOnce() -> Result<T>) -> Result<T> {
-    let mut missing = Vec::new();
-    for step in steps {
-        let Step::Dispatch { which: Which::Named(name, specialization), .. } = step else { continue };
-        let same = |(known, table): &(Name, &Arc<Specialization>)| known == name && *table == specialization;
-        if !missing.iter().any(same) && !gpu.is_compiled(*name, specialization)? {
-            missing.push((*name, specialization));
+/// The kernels that steps name.
+fn wanted(steps: &[Step]) -> Vec<Wanted> {
+    let named = |step: &Step| match step {
+        Step::Dispatch { which: Which::Named(name, specialization), .. } => Some((*name, specialization.clone())),
+        _ => None,
+    };
+    steps.iter().filter_map(named).collect()
+}
+
+/// Does `work` while kernels are compiled on other threads.
+fn compiling<T>(gpu: &Gpu, wanted: impl Iterator<Item = Wanted>, work: impl FnOnce() -> Result<T>) -> Result<T> {
+    let mut missing: Vec<Wanted> = Vec::new();
+    for (name, specialization) in wanted {
+        let same = |(known, table): &Wanted| *known == name && *table == specialization;
+        if !missing.iter().any(same) && !gpu.is_compiled(name, &specialization)? {
+            missing.push((name, specialization));
         }
     }
     thread::scope(|scope| {
         let threads: Vec<_> = missing
             .into_iter()
-            .map(|(name, specialization)| scope.spawn(move || gpu.kernel(name, specialization).map(drop)))
+            .map(|(name, specialization)| scope.spawn(move || gpu.kernel(name, &specialization).map(drop)))
             .collect();
         let done = work()?;
         for thread in threads {
@@ -500,9 +517,8 @@ impl<'a> Submission<'a> {
         };
         let Some((ticks, period)) = ours.get(1).zip(self.gpu.nanoseconds_per_tick) else {
             // Without timestamps all are as much slower or faster than thought.
-            let each = |(kernel, extent): &(Arc<Kernel>, Extent)| {
-                invocations(*extent) * self.gpu.seconds_each(&kernel.label)
-            };
+            let each =
+                |(kernel, extent): &(Arc<Kernel>, Extent)| invocations(*extent) * self.gpu.seconds_each(&kernel.label);
             let thought: f64 = self.dispatched.iter().map(each).sum();
             let ratio = self.started.elapsed().as_secs_f64() / thought.max(1e-9);
             for (kernel, extent) in &self.dispatched {

@@ -141,8 +141,7 @@ impl Renderer {
     ) -> Result<Picture> {
         let (mut frame, params) = shot.checked(self.size, &self.quality)?;
         frame.first_sample = first_sample;
-        frame.ground_shadow =
-            u32::from((shot.background || layers) && frame.has_ground_shadow(shot.camera, &params));
+        frame.ground_shadow = u32::from((shot.background || layers) && frame.has_ground_shadow(shot.camera, &params));
         let plan = Plan::new(&mut frame, &params, &self.quality, false, layers);
         self.timings = Timings::default();
         let mut rec = Recorder::new(&self.gpu, &mut self.timings, interrupt);
@@ -224,11 +223,13 @@ impl Renderer {
             reproject::rescale(&mut rec, &frame, &old.before, before);
         }
         let index = last.as_ref().map_or(0, |last| last.index + 1);
+        let buffers = reproject::Buffers { refined, current, before, scene_before, now };
+        let follow = |rec: &mut Recorder<'_>| reproject::record(rec, &frame, &self.quality, index, &buffers);
         if frame.cloudless > 0 {
         } else if last.is_some() {
-            let buffers = reproject::Buffers { refined, current, before, scene_before, now };
-            reproject::record(&mut rec, &frame, &self.quality, index, &buffers);
+            follow(&mut rec);
         } else {
+            rec.compile_ahead(follow);
             reproject::begin(&mut rec, &frame, &self.quality, refined, now);
         }
         let parts = Parts { marched: &now.marched, backdrop, refined, out: composed };

@@ -64,3 +64,31 @@ fn of_sky(params: &Params, quality: &Quality) -> Specialization {
         ("HIGH_LOW_SUN", 0.0),
     ])
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+    use crate::shader::{self, Linked};
+
+    /// A name that stands in one of them only is a switch that does nothing, or one that nobody sets.
+    #[test]
+    fn the_table_and_the_shaders_name_the_same_constants() {
+        let frame = Frame::default();
+        let table = of_picture(&Params::default(), &Quality::default(), &frame, false).with(&[("DISCS", 1.0)]);
+        let ours: BTreeSet<_> = table.names().map(str::to_owned).collect();
+        let mut theirs = BTreeSet::new();
+        for name in shader::names() {
+            let (module, _) = Linked::new(name).expect("links").parse().expect("is valid");
+            // Those that are worked out from others are nobody's to set.
+            let free = |constant: &wgpu::naga::Override| {
+                constant
+                    .init
+                    .is_none_or(|init| matches!(module.global_expressions[init], wgpu::naga::Expression::Literal(_)))
+            };
+            theirs.extend(module.overrides.iter().filter(|(_, o)| free(o)).filter_map(|(_, o)| o.name.clone()));
+        }
+        assert_eq!(ours, theirs);
+    }
+}

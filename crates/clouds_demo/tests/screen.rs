@@ -52,7 +52,8 @@ fn screens_of_another_size_are_refused() {
     let mut renderer = renderer(64, 40);
     let screen = Screen::new(&renderer.gpu().clone(), [64, 41], 0.0, "agx").expect("is made");
     let (camera, params, time) = shot(0);
-    let error = renderer.animate_onto(&screen, &Shot::new(&camera, &params, time), &|| Ok(())).expect_err("does not fit");
+    let error =
+        renderer.animate_onto(&screen, &Shot::new(&camera, &params, time), &|| Ok(())).expect_err("does not fit");
     assert!(error.to_string().contains("64 x 41"), "{error}");
     assert!(Screen::new(renderer.gpu(), [64, 40], 0.0, "best").is_err());
 }

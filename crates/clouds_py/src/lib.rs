@@ -8,11 +8,11 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 
+use clouds_core::Shot;
 use clouds_core::camera::{Camera as CoreCamera, Convention, Projection};
 use clouds_core::gpu::{self, lock};
 use clouds_core::params::{Params, Quality};
 use clouds_core::renderer::Renderer as CoreRenderer;
-use clouds_core::Shot;
 use clouds_core::scene_depth::SceneDepth;
 use clouds_core::schema::Value;
 use clouds_core::wind::{Between, Carried, NUMBERS};

@@ -73,8 +73,8 @@ impl Noise {
         let (shape, coarse, curl) = match other {
             Some(noise) => (noise.shape.clone(), noise.coarse.clone(), noise.curl.clone()),
             None => {
-                let [shape, coarse] =
-                    [("shape", SHAPE_SIZE), ("detail", DETAIL_SIZE)].map(|(label, size)| volume(rec.gpu, label, size, 1));
+                let [shape, coarse] = [("shape", SHAPE_SIZE), ("detail", DETAIL_SIZE)]
+                    .map(|(label, size)| volume(rec.gpu, label, size, 1));
                 let curl = rec.gpu.flat("curl", [CURL_SIZE; 2], wgpu::TextureFormat::Rg16Float);
                 load_or_bake(rec, "noise", "noise", &format!("{key:?}"), &[&shape, &coarse, &curl], |rec| {
                     bake_volume(rec, "shape", vec![], &shape);

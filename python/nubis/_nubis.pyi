@@ -244,6 +244,9 @@ class Renderer:
         eye: tuple[float, float, float],
         time: float,
     ) -> npt.NDArray[np.float32]: ...
+    def counters(self) -> list[int]:
+        """Submissions to the device so far, and how often one was waited for."""
+
     def timings(self) -> list[tuple[str, float]]: ...
     def memory(self) -> list[tuple[str, str, int]]:
         """What the last picture has left on the GPU: for whom, the variable, bytes."""

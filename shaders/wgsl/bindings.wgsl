@@ -95,15 +95,15 @@ override LIGHT_CHEAP: bool = true; // there are light samples that do not
 @group(0) @binding(38) var<storage, read_write> ray_count: atomic<u32>;
 @group(0) @binding(39) var<storage, read_write> cloud_span: array<vec2f>;
 
-// Indirect dispatches (passes/arrange): what is arranged, how many entries the list has, the arguments, and, for who runs over a
-// list, how many invocations all of it has in `w`.
+// Indirect dispatches (passes/arrange): what is arranged, how many entries the list has, the arguments, and, in `w`,
+// how many invocations the whole list has.
 @group(0) @binding(74) var<uniform> arrangement: vec4u;
 @group(0) @binding(75) var<storage, read_write> list_count: u32;
 @group(0) @binding(76) var<storage, read_write> arguments: array<u32>;
 @group(0) @binding(77) var<uniform> listed: vec4u;
 
-// Whether a frame is a still (passes/reproject): votes for that less those for going on; how many pixels may be marched one by
-// one, as an f32; and the decision.
+// Whether a frame is a still (passes/reproject): votes for that less those for going on; how many pixels may be marched
+// one by one, as an f32; and the decision.
 @group(0) @binding(78) var<storage, read_write> votes: atomic<i32>;
 @group(0) @binding(79) var<uniform> most_listed: vec4f;
 @group(0) @binding(80) var<storage, read_write> is_still: u32;

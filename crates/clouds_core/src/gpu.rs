@@ -663,7 +663,7 @@ pub(crate) fn mips(
     })
 }
 
-/// The rows that [`Work::download_texture`] gave, without what pads them.
+/// The rows that `Recorder::download_texture` gave, without what pads them.
 pub(crate) fn texture_rows<'a>(texture: &'a wgpu::Texture, bytes: &'a [u8]) -> impl Iterator<Item = &'a [u8]> {
     let padded = mips(texture, COPIED).zip(mips(texture, 1));
     padded.flat_map(move |((_, layout, size), (_, tight, _))| {

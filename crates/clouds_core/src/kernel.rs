@@ -141,7 +141,6 @@ impl Program {
     }
 
     /// The same of linked source.
-    #[expect(clippy::disallowed_methods, reason = "the one place that makes shader modules")]
     pub fn from_linked(gpu: &Gpu, linked: &Linked) -> Result<Self> {
         let (module, info) = linked.parse().map_err(Error::Device)?;
         let entries = module.entry_points.iter().enumerate().map(|(index, point)| {

@@ -330,8 +330,8 @@ fn limited(cubic: vec4f, linear: vec4f, above: HistoryRow, below: HistoryRow, x:
     return linear + min(min(share.x, share.y), min(share.z, share.w)) * beyond;
 }
 
-// Whether the frame is a still: where most rays are not what the history says, or where more pixels are listed than a still marches.
-// The list is empty then.
+// Whether the frame is a still: where most rays are not what the history says, or where more pixels are listed than a
+// still marches. The list is empty then.
 @compute @workgroup_size(1)
 fn choose() {
     is_still = select(0u, 1u, atomicLoad(&votes) > 0 || f32(atomicLoad(&ray_count)) > most_listed.x);

@@ -85,7 +85,7 @@ impl GroundShadow {
                 rec.dispatch(("shadow", entry), [&ours, reads].concat(), size);
             };
             bake("shadow_ground", &[], &single, size);
-            bake("shadow_mean", &[made.clone()], &mean, [SIDE, 1, 1]);
+            bake("shadow_mean", std::slice::from_ref(&made), &mean, [SIDE, 1, 1]);
             bake("shadow_blend", &[made, of_all], &levels, size);
             Ok(levels)
         })?;

@@ -487,7 +487,7 @@ def test_workgroups_do_each_part_once(count):
     x = np.stack([numbers, np.full(count, count)], axis=-1)
     parts = probe("f32(spread(u32(x.x), u32(x.y)))", x, imports=["workgroups"])[:, 0]
     np.testing.assert_array_equal(np.sort(parts), numbers)
-    threads = int(probe("f32(frame.threads)", [0.0])[0, 0])
+    threads = int(probe("f32(dispatch.threads)", [0.0])[0, 0])
     assert threads >= 1
     if count >= 8 * threads:
         gaps = np.diff(parts[: count // threads])

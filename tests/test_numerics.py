@@ -72,7 +72,7 @@ def test_distance_to_a_shell_from_the_ground(height):
     elevations = [0, 0.01, 0.1, 1, 5, 20, 45, 80, 90]
     directions = f32([twin.compass(30, e) for e in elevations])
     params = nubis.Params().with_(**{"clouds.base": height, "clouds.top": height + 1000})
-    hit = "hit_sphere(x.xyz, frame.power_base)"
+    hit = "hit_sphere(x.xyz, frame.view.power_base)"
     wgsl = f"vec4f({hit}.near, {hit}.far, 0.0, 0.0)"
     near, far = probe(wgsl, directions, imports=["shell"], params=params)[:, :2].T
     expected = twin.sphere_hits((0, 0, 0), twin.normalized(directions), EARTH, height)[1]

@@ -330,7 +330,7 @@ def test_shadows_drift_with_the_wind(wander):
         baked = np.floor(time / period) * period
         for eye, place in [((0.0, 0.0), (0.0, 0.0)), ((299.0, -1510.0), (0.0, -1800.0))]:
             got = probe(
-                "vec4f(frame.shadow_eye, 0.0, 0.0)",
+                "vec4f(frame.sky.shadow_eye, 0.0, 0.0)",
                 [0.0],
                 imports=["bindings"],
                 params=params,

@@ -11,8 +11,8 @@ struct Way {
 }
 
 fn air_way(direction: vec3f) -> Way {
-    let air = hit_sphere(direction, frame.power_air);
-    let ground = hit_sphere(direction, frame.power_ground);
+    let air = hit_sphere(direction, frame.view.power_air);
+    let ground = hit_sphere(direction, frame.view.power_ground);
     let end = select(air.far, ground.near, ground.enters);
     return Way(air.near, select(0.0, max(end - air.near, 0.0), air.hit), ground.enters);
 }
@@ -90,7 +90,7 @@ fn whole_air(direction: vec3f, way: Way, texels: AirTexels, sky: vec3f) -> Air {
         let depth = aerial_depth(direction, way.start, way.start + way.length, GROUND_PIECES);
         return Air(exp(-params.atmosphere.aerial_perspective * depth), radiance);
     }
-    let altitude = select(max(frame.altitude, 0.0), AIR_TOP, frame.power_air > 0.0);
+    let altitude = select(max(frame.view.altitude, 0.0), AIR_TOP, frame.view.power_air > 0.0);
     let through = air_transmittance(altitude, cos_zenith_along(direction, way.start, altitude));
     return Air(select(vec3f(1.0), through, way.length > 0.0), radiance);
 }

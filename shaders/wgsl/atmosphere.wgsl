@@ -207,14 +207,14 @@ fn ground_radiance(mu: f32) -> vec3f {
 // Coordinates of a direction in the sky map: azimuth from the sun across, angle from the horizon down, with square
 // roots so that the horizon, where the sky changes fastest, has most of the rows; its edge is the middle of the map.
 fn sky_coordinates(direction: vec3f) -> vec2f {
-    let sine = clamp(dot(direction, frame.zenith), -1.0, 1.0);
-    let elevation = asin(sine) + frame.horizon_dip;
-    let flat_sun = frame.sun_direction - dot(frame.sun_direction, frame.zenith) * frame.zenith;
-    let flat_view = direction - sine * frame.zenith;
+    let sine = clamp(dot(direction, frame.view.zenith), -1.0, 1.0);
+    let elevation = asin(sine) + frame.view.horizon_dip;
+    let flat_sun = frame.sky.sun_direction - dot(frame.sky.sun_direction, frame.view.zenith) * frame.view.zenith;
+    let flat_view = direction - sine * frame.view.zenith;
     let cosine = dot(flat_sun, flat_view) / max(length(flat_sun) * length(flat_view), 1e-6);
     let u = acos(clamp(cosine, -1.0, 1.0)) / PI;
-    let above = saturate(elevation / (0.5 * PI + frame.horizon_dip));
-    let below = saturate(-elevation / (0.5 * PI - frame.horizon_dip));
+    let above = saturate(elevation / (0.5 * PI + frame.view.horizon_dip));
+    let below = saturate(-elevation / (0.5 * PI - frame.view.horizon_dip));
     let v = select(0.5 + 0.5 * sqrt(below), 0.5 - 0.5 * sqrt(above), elevation >= 0.0);
     return vec2f(u, v);
 }
@@ -230,11 +230,11 @@ fn sky_texel(at: vec2f, size: vec2f) -> vec2f {
     return vec2f(mix(half_texel.x, 1.0 - half_texel.x, at.x), v);
 }
 
-// What the sky map holds is the radiance over `frame.sky_unit`, the sun's irradiance or what the night is as bright as, times
-// `frame.sky_scale`: at most 4 in front of the sun, and 1e-9 at night, which would not fit into half floats (6e-8 to 65,504)
+// What the sky map holds is the radiance over `frame.sky.sky_unit`, the sun's irradiance or what the night is as bright as, times
+// `frame.sky.sky_scale`: at most 4 in front of the sun, and 1e-9 at night, which would not fit into half floats (6e-8 to 65,504)
 // together. The irradiance can be anything.
 // Radiance of the air in a direction, without clouds, sun and ground.
 fn sky_radiance(direction: vec3f) -> vec3f {
     let uv = sky_texel(sky_coordinates(direction), vec2f(textureDimensions(sky_map)));
-    return textureSampleLevel(sky_map, clamp_sampler, uv, 0.0).rgb * (frame.sky_unit / frame.sky_scale);
+    return textureSampleLevel(sky_map, clamp_sampler, uv, 0.0).rgb * (frame.sky.sky_unit / frame.sky.sky_scale);
 }

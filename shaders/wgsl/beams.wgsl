@@ -8,19 +8,19 @@ const BEAM_BEND = 2000.0;
 
 // The distance at a share of the slices, and the share at a distance.
 fn beam_distance(share: f32) -> f32 {
-    let most = log(1.0 + frame.beam_length / BEAM_BEND);
-    return frame.beam_start + BEAM_BEND * (exp(share * most) - 1.0);
+    let most = log(1.0 + frame.view.beam_length / BEAM_BEND);
+    return frame.view.beam_start + BEAM_BEND * (exp(share * most) - 1.0);
 }
 
 fn beam_share(distance: f32) -> f32 {
-    let most = log(1.0 + frame.beam_length / BEAM_BEND);
-    return saturate(log(1.0 + max(distance - frame.beam_start, 0.0) / BEAM_BEND) / most);
+    let most = log(1.0 + frame.view.beam_length / BEAM_BEND);
+    return saturate(log(1.0 + max(distance - frame.view.beam_start, 0.0) / BEAM_BEND) / most);
 }
 
 // Where they have a direction: the outer texels lie on the rim of the picture, so that a panorama has no seam.
 fn beam_texel(direction: vec3f) -> vec2f {
-    let local = vec3f(dot(direction, frame.right), dot(direction, frame.up), dot(direction, frame.forward));
-    let place = picture_place(local, frame.tan_half_fov, frame.half_fov).xy * vec2f(0.5, -0.5) + 0.5;
+    let local = vec3f(dot(direction, frame.view.right), dot(direction, frame.view.up), dot(direction, frame.view.forward));
+    let place = picture_place(local, frame.view.tan_half_fov, frame.view.half_fov).xy * vec2f(0.5, -0.5) + 0.5;
     let size = vec2f(textureDimensions(beams).xy);
     return (saturate(place) * (size - 1.0) + 0.5) / size;
 }
@@ -29,5 +29,5 @@ fn beam_texel(direction: vec3f) -> vec2f {
 fn beams_before(texel: vec2f, distance: f32) -> vec3f {
     let slices = f32(textureDimensions(beams).z);
     let at = vec3f(texel, (beam_share(distance) * (slices - 1.0) + 0.5) / slices);
-    return textureSampleLevel(beams, clamp_sampler, at, 0.0).rgb * (params.sun.irradiance / frame.sky_scale);
+    return textureSampleLevel(beams, clamp_sampler, at, 0.0).rgb * (params.sun.irradiance / frame.sky.sky_scale);
 }

@@ -1,6 +1,6 @@
 // Every resource that a shader can name, numbered once. A kernel binds only those that it uses.
 #import params
-#import frame
+#import uniforms
 
 // What a pipeline is made for; the rest is compiled out (crates/clouds_core/src/kernel.rs).
 override MODEL: u32 = 0u; // light.model
@@ -25,9 +25,12 @@ override WIDE_PHASE: bool = false; // the phase function varies within a pixel
 override LIGHT_DETAIL: bool = true; // there are light samples that see the detail
 override LIGHT_CHEAP: bool = true; // there are light samples that do not
 
+// By how long they hold: what the user sets; what follows from that for a frame; which pixels a dispatch is for. At most these
+// three may decide branches by themselves: of a fourth and later ones, by number, lavapipe (Mesa 22.3) writes where such numbers
+// lie beyond the end of a table, and crashes.
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<uniform> frame: Frame;
-@group(0) @binding(28) var<uniform> quality: Quality;
+@group(0) @binding(28) var<uniform> dispatch: Dispatch;
 @group(0) @binding(2) var repeat_sampler: sampler; // linear, nearest mip, repeats
 @group(0) @binding(3) var clamp_sampler: sampler; // linear, clamps
 @group(0) @binding(42) var weather_sampler: sampler; // linear, beyond the map as weather.edge says
@@ -41,13 +44,12 @@ override LIGHT_CHEAP: bool = true; // there are light samples that do not
 @group(0) @binding(49) var profile_table: texture_2d<f32>; // density by type and height (passes/profile)
 @group(0) @binding(50) var phase_table: texture_2d<f32>; // phase function and its integral by angle (passes/phase)
 @group(0) @binding(8) var high_map: texture_2d<f32>; // density of the high clouds (passes/high_clouds)
-@group(0) @binding(9) var sky_map: texture_2d<f32>; // the sky by direction, times frame.sky_scale (passes/sky)
+@group(0) @binding(9) var sky_map: texture_2d<f32>; // the sky by direction, times frame.sky.sky_scale (passes/sky)
 @group(0) @binding(60) var air_depth: texture_2d<f32>; // of the air to space, by altitude and direction (passes/transmittance)
 @group(0) @binding(61) var air_light: texture_2d<f32>; // scattered light by altitude and sun, see SCATTERED (passes/multiscatter)
 @group(0) @binding(62) var air_share: texture_3d<f32>; // share of the sky before a distance, by direction (passes/sky)
 @group(0) @binding(10) var<storage, read_write> sky_light: array<vec4f, 4>; // what the sky gives to clouds (passes/sky)
-// The same for where it decides little: a load from storage costs lavapipe a loop over the lanes. Not for all: as a uniform of number 10
-// it crashed lavapipe (Mesa 22.3.6) in `path`, where it decides a branch; with a number after all others it did not.
+// The same for where it decides no branch: a load from storage costs lavapipe a loop over the lanes.
 @group(0) @binding(41) var<uniform> sky_light_uniform: array<vec4f, 4>;
 @group(0) @binding(11) var blue_noise: texture_2d<f32>; // 64 x 64 ranks in [0, 1), void and cluster
 
@@ -63,7 +65,7 @@ override LIGHT_CHEAP: bool = true; // there are light samples that do not
 // Direct sun on the ground around the eye: levels in a stack, and, while they are baked, the mean of the last (passes/shadow).
 @group(0) @binding(72) var ground_shadow: texture_2d<f32>;
 @group(0) @binding(73) var ground_shadow_mean: texture_2d<f32>;
-// Light that the air before a distance lacks in those shadows, by place in the picture, times frame.sky_scale (passes/beams).
+// Light that the air before a distance lacks in those shadows, by place in the picture, times frame.sky.sky_scale (passes/beams).
 @group(0) @binding(51) var beams: texture_3d<f32>;
 
 // One entry a pixel, row by row; of the clouds one for each that they are known at (lattice.wgsl).

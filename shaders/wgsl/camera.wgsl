@@ -9,7 +9,7 @@ const FISHEYE = 2u; // equidistant: the angle to the axis grows linearly from th
 // A direction to the right, up and forward, or nothing (w = 0) outside the circle of a fisheye. Of a pinhole its last is 1,
 // which keeps the digits of narrow views; of the others it is one long. `pixel` has its centres at half-integers.
 fn local_direction(pixel: vec2f) -> vec4f {
-    let size = vec2f(f32(frame.width), f32(frame.height));
+    let size = vec2f(f32(frame.view.width), f32(frame.view.height));
     let ndc = vec2f(2.0, -2.0) * (pixel / size) + vec2f(-1.0, 1.0); // right and up
     var local: vec3f; // right, up, forward
     var valid = 1.0;
@@ -22,12 +22,12 @@ fn local_direction(pixel: vec2f) -> vec4f {
         case FISHEYE: {
             let p = ndc * size / min(size.x, size.y);
             let r = length(p);
-            let angle = r * frame.half_fov;
+            let angle = r * frame.view.half_fov;
             local = vec3f(p / max(r, 1e-9) * sin(angle), cos(angle));
             valid = select(0.0, 1.0, r <= 1.0);
         }
         default: {
-            local = vec3f(ndc * vec2f(size.x / size.y, 1.0) * frame.tan_half_fov, 1.0);
+            local = vec3f(ndc * vec2f(size.x / size.y, 1.0) * frame.view.tan_half_fov, 1.0);
         }
     }
     return vec4f(local, valid);
@@ -36,7 +36,7 @@ fn local_direction(pixel: vec2f) -> vec4f {
 // The same in the world, one long.
 fn view_direction(pixel: vec2f) -> vec4f {
     let local = local_direction(pixel);
-    let direction = local.x * frame.right + local.y * frame.up + local.z * frame.forward;
+    let direction = local.x * frame.view.right + local.y * frame.view.up + local.z * frame.view.forward;
     return vec4f(normalize(direction), local.w);
 }
 
@@ -60,7 +60,7 @@ fn place_weight(pixel: vec2f) -> f32 {
 
 // Solid angle of a pixel, given by its corner, sr.
 fn pixel_solid_angle(corner: vec2f) -> f32 {
-    let size = vec2f(f32(frame.width), f32(frame.height));
+    let size = vec2f(f32(frame.view.width), f32(frame.view.height));
     switch CAMERA {
         case EQUIRECT: {
             let high = PI / size.y;
@@ -68,7 +68,7 @@ fn pixel_solid_angle(corner: vec2f) -> f32 {
             return 2.0 * PI / size.x * 2.0 * cos(latitude) * sin(0.5 * high);
         }
         case FISHEYE: {
-            let width = 2.0 * frame.half_fov / min(size.x, size.y);
+            let width = 2.0 * frame.view.half_fov / min(size.x, size.y);
             return width * width * place_weight(corner + 0.5);
         }
         default: {
@@ -77,7 +77,7 @@ fn pixel_solid_angle(corner: vec2f) -> f32 {
             let b = local_direction(corner + vec2f(1.0, 0.0)).xyz;
             let c = local_direction(corner + 1.0).xyz;
             let d = local_direction(corner + vec2f(0.0, 1.0)).xyz;
-            let wide = 2.0 * frame.tan_half_fov / size.y;
+            let wide = 2.0 * frame.view.tan_half_fov / size.y;
             return 2.0 * (atan2(wide * wide, triangle_denominator(a, b, c)) + atan2(wide * wide, triangle_denominator(a, c, d)));
         }
     }
@@ -91,14 +91,14 @@ fn triangle_denominator(a: vec3f, b: vec3f, c: vec3f) -> f32 {
 // The pixel that is marched for a cell of a subset. The last cells may hang over the edge; they march the edge, or, in a sparse
 // picture, what is beyond.
 fn marched_pixel(cell: vec2u) -> vec2u {
-    let pixel = cell * frame.stride + vec2u(frame.subpixel_x, frame.subpixel_y);
-    return select(min(pixel, vec2u(frame.width, frame.height) - 1u), pixel, SPARSE);
+    let pixel = cell * dispatch.stride + vec2u(dispatch.subpixel_x, dispatch.subpixel_y);
+    return select(min(pixel, vec2u(frame.view.width, frame.view.height) - 1u), pixel, SPARSE);
 }
 
 // Where in the picture of a camera a direction falls, given as right, up and forward of that: from -1 to 1, right and up, or
 // beyond; z is 0 behind the camera.
 fn picture_place(local: vec3f, tan_half_fov: f32, half_fov: f32) -> vec3f {
-    let size = vec2f(f32(frame.width), f32(frame.height));
+    let size = vec2f(f32(frame.view.width), f32(frame.view.height));
     var ndc: vec2f;
     var valid = true;
     switch CAMERA {
@@ -121,18 +121,18 @@ fn picture_place(local: vec3f, tan_half_fov: f32, half_fov: f32) -> vec3f {
 // The pixel that a direction from the previous camera falls on, in the picture or not; z is 0 behind the camera.
 fn previous_pixel(direction: vec3f) -> vec3f {
     let local = vec3f(
-        dot(direction, frame.previous_right),
-        dot(direction, frame.previous_up),
-        dot(direction, frame.previous_forward),
+        dot(direction, frame.view.previous_right),
+        dot(direction, frame.view.previous_up),
+        dot(direction, frame.view.previous_forward),
     );
-    let place = picture_place(local, frame.previous_tan_half_fov, frame.previous_half_fov);
-    let size = vec2f(f32(frame.width), f32(frame.height));
+    let place = picture_place(local, frame.view.previous_tan_half_fov, frame.view.previous_half_fov);
+    let size = vec2f(f32(frame.view.width), f32(frame.view.height));
     return vec3f((place.xy * vec2f(0.5, -0.5) + 0.5) * size, place.z);
 }
 
 // Whether there is a picture at a pixel: not beyond its edges, where a panorama has only two, nor the circle of a fisheye.
 fn in_picture(pixel: vec2i) -> bool {
-    let size = vec2i(vec2u(frame.width, frame.height));
+    let size = vec2i(vec2u(frame.view.width, frame.view.height));
     if CAMERA == FISHEYE {
         return distance(vec2f(pixel) + 0.5, 0.5 * vec2f(size)) <= 0.5 * f32(min(size.x, size.y));
     }
@@ -143,7 +143,7 @@ fn in_picture(pixel: vec2i) -> bool {
 // The same motion across a picture, around a panorama the shorter way.
 fn shortest_way(motion: vec2f) -> vec2f {
     if CAMERA == EQUIRECT {
-        let width = f32(frame.width);
+        let width = f32(frame.view.width);
         return motion - vec2f(width * round(motion.x / width), 0.0);
     }
     return motion;
@@ -154,14 +154,14 @@ fn shortest_way(motion: vec2f) -> vec2f {
 fn pixel_width(direction: vec3f) -> f32 {
     switch CAMERA {
         case EQUIRECT: {
-            let level = sqrt(max(1.0 - dot(direction, frame.up) * dot(direction, frame.up), 0.0));
-            return PI * max(2.0 * level / f32(frame.width), 1.0 / f32(frame.height));
+            let level = sqrt(max(1.0 - dot(direction, frame.view.up) * dot(direction, frame.view.up), 0.0));
+            return PI * max(2.0 * level / f32(frame.view.width), 1.0 / f32(frame.view.height));
         }
         case FISHEYE: {
-            return 2.0 * frame.half_fov / f32(min(frame.width, frame.height));
+            return 2.0 * frame.view.half_fov / f32(min(frame.view.width, frame.view.height));
         }
         default: {
-            return 2.0 * frame.tan_half_fov / f32(frame.height) * dot(direction, frame.forward);
+            return 2.0 * frame.view.tan_half_fov / f32(frame.view.height) * dot(direction, frame.view.forward);
         }
     }
 }

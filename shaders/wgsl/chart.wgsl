@@ -11,16 +11,16 @@
 const CHART_END = 0.01;
 
 fn chart_rise(p: vec3f, altitude: f32) -> f32 {
-    return altitude - frame.altitude + p.z;
+    return altitude - frame.view.altitude + p.z;
 }
 
 // Metres of the chart for each level metre at a point.
 fn chart_scale(p: vec3f, altitude: f32) -> f32 {
     let radius = params.atmosphere.planet_radius;
-    return 2.0 * radius / max(frame.chart_reach + chart_rise(p, altitude), CHART_END * radius);
+    return 2.0 * radius / max(frame.view.chart_reach + chart_rise(p, altitude), CHART_END * radius);
 }
 
 // Where a point, relative to the eye, lies on the chart, relative to the eye, m east and north.
 fn on_chart(p: vec3f, altitude: f32) -> vec2f {
-    return chart_scale(p, altitude) * (p.xy - chart_rise(p, altitude) * frame.chart_slope);
+    return chart_scale(p, altitude) * (p.xy - chart_rise(p, altitude) * frame.view.chart_slope);
 }

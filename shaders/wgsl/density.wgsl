@@ -48,8 +48,8 @@ fn kept_clear(place: vec2f) -> f32 {
     if !KEEP_CLEAR {
         return 1.0;
     }
-    let radius = frame.clear_radius;
-    return smoothstep(radius, 1.5 * radius, length(place - frame.clear_at));
+    let radius = frame.sky.clear_radius;
+    return smoothstep(radius, 1.5 * radius, length(place - frame.sky.clear_at));
 }
 
 // Where the profile of a type rises from 0 to 1 and falls back, as fractions of the height: the weighted sum of three
@@ -101,14 +101,14 @@ fn eroded(shape: f32, detail: f32, height: f32) -> f32 {
 fn cloud_column(p: vec3f, altitude: f32) -> Column {
     evaluations += 1u;
     if VOLUME {
-        let height = saturate((p.z - frame.volume_low.z) / (frame.volume_high.z - frame.volume_low.z));
-        let thickness = frame.volume_high.z - frame.volume_low.z;
+        let height = saturate((p.z - frame.sky.volume_low.z) / (frame.sky.volume_high.z - frame.sky.volume_low.z));
+        let thickness = frame.sky.volume_high.z - frame.sky.volume_low.z;
         return Column(select(0.0, 1.0, in_volume(p)), 1.0, 1.0, height, 0.0, p, CLOUD, thickness, height);
     }
     let place = on_chart(p, altitude);
     let at = leant(place, altitude);
     let broad = broad_weather(at);
-    var weather = weather_from_map(weather_texel(frame.weather_origin, at, broad));
+    var weather = weather_from_map(weather_texel(frame.sky.weather_origin, at, broad));
     weather.coverage *= kept_clear(place);
     var column = cloud_in(weather, at, altitude);
     if RAIN_SHAFTS && altitude < params.clouds.base {
@@ -117,12 +117,12 @@ fn cloud_column(p: vec3f, altitude: f32) -> Column {
     if UPPER {
         // Within the height of that deck where there is nothing, too: the march reads how much it lacks of being cloud.
         let upper = upper_cloud_at(place, altitude, broad);
-        let alone = altitude > frame.lower_top && upper.height > 0.0 && upper.height < 1.0;
+        let alone = altitude > frame.sky.lower_top && upper.height > 0.0 && upper.height < 1.0;
         if upper.limit > column.limit || (column.limit <= 0.0 && alone) {
             column = upper;
         }
         // Of a deck that hardly shows there is what the shell has room for (`shell` in params.rs).
-        column.limit = select(0.0, column.limit, altitude >= frame.shell_base && altitude <= frame.shell_top);
+        column.limit = select(0.0, column.limit, altitude >= frame.sky.shell_base && altitude <= frame.sky.shell_top);
     }
     return column;
 }
@@ -130,7 +130,7 @@ fn cloud_column(p: vec3f, altitude: f32) -> Column {
 // A place on the chart, without the wind's lean.
 fn leant(place: vec2f, altitude: f32) -> vec2f {
     let lean = (altitude - params.clouds.base) / (params.clouds.top - params.clouds.base) * params.wind.shear;
-    return place - lean * frame.wind_direction;
+    return place - lean * frame.sky.wind_direction;
 }
 
 // Which way the larger map bends the smaller one, across and down: along no axis of their tiles.
@@ -140,7 +140,7 @@ const BEND = vec2f(0.8, 0.6);
 // repetition.
 fn broad_weather(at: vec2f) -> vec4f {
     if BROAD_WEATHER {
-        let uv = frame.broad_origin + vec2f(at.x, -at.y) / params.weather.broad_extent;
+        let uv = frame.sky.broad_origin + vec2f(at.x, -at.y) / params.weather.broad_extent;
         return textureSampleLevel(broad_map, repeat_sampler, uv, 0.0);
     }
     return vec4f(0.0);
@@ -148,13 +148,13 @@ fn broad_weather(at: vec2f) -> vec4f {
 
 fn weather_uv(origin: vec2f, at: vec2f, broad: vec4f) -> vec2f {
     let uv = origin + vec2f(at.x, -at.y) / params.weather.extent;
-    return select(uv, uv + frame.broad_bend * broad.a * BEND, BROAD_WEATHER);
+    return select(uv, uv + frame.sky.broad_bend * broad.a * BEND, BROAD_WEATHER);
 }
 
 // The weather map at a place `at` from where the eye is in its tile.
 fn weather_texel(origin: vec2f, at: vec2f, broad: vec4f) -> vec3f {
     let texel = textureSampleLevel(weather_map, weather_sampler, weather_uv(origin, at, broad), 0.0).rgb;
-    return select(texel, saturate(texel + frame.broad_scale * broad.rgb), BROAD_WEATHER);
+    return select(texel, saturate(texel + frame.sky.broad_scale * broad.rgb), BROAD_WEATHER);
 }
 
 // How much of a cumulonimbus stands where it rains so much: its tower in the core of the rain, its anvil farther around.
@@ -220,9 +220,9 @@ fn with_extent(given: Column, kind: f32, rain: f32, whole: f32) -> Column {
 fn upper_cloud_at(place: vec2f, altitude: f32, broad: vec4f) -> Column {
     let base = params.upper_clouds.base;
     let height = (altitude - base) / (params.upper_clouds.top - base);
-    let lean = height * params.upper_clouds.shear * frame.upper_direction;
+    let lean = height * params.upper_clouds.shear * frame.sky.upper_direction;
     let at = vec3f(place - lean, altitude) / params.upper_clouds.scale;
-    let texel = weather_texel(frame.upper_weather_origin, at.xy, broad);
+    let texel = weather_texel(frame.sky.upper_weather_origin, at.xy, broad);
     let coverage = kept_clear(place) * saturate(texel.r + 2.0 * params.upper_clouds.coverage - 1.0);
     let kind = saturate(texel.g + 2.0 * params.upper_clouds.type_ - 1.0);
     let profile = height_profile(height, kind, 0.0);
@@ -238,9 +238,9 @@ const RAIN_STRETCH = 12.0;
 // Rain below the base, thinned by the air that it falls through.
 fn rain_below(weather: LocalWeather, at: vec2f, altitude: f32) -> Column {
     let height = altitude / params.clouds.base;
-    let wet = frame.rain_reach * weather.precipitation * weather.coverage;
+    let wet = frame.sky.rain_reach * weather.precipitation * weather.coverage;
     let limit = select(0.0, saturate(2.0 * wet - 0.6 + 0.6 * height), altitude > 0.0);
-    let streak = vec3f(at, altitude / RAIN_STRETCH + frame.rain_fall);
+    let streak = vec3f(at, altitude / RAIN_STRETCH + frame.sky.rain_fall);
     // All of the cloud is above it.
     let thickness = cloud_top(weather.precipitation) - params.clouds.base;
     return Column(limit, 1.0, 1.0, 0.0, weather.precipitation, streak, RAIN, thickness, 0.0);
@@ -261,7 +261,7 @@ fn base_noise(column: Column) -> f32 {
         return volume_density(column.at);
     }
     let upper = UPPER && column.medium == UPPER_CLOUD;
-    let origin = select(frame.shape_origin, frame.upper_shape_origin, upper);
+    let origin = select(frame.sky.shape_origin, frame.sky.upper_shape_origin, upper);
     return textureSampleLevel(shape_noise, repeat_sampler, origin + column.at / params.clouds.shape_scale, 0.0).r;
 }
 
@@ -288,10 +288,10 @@ fn cloud_density(column: Column, shape: f32, width: f32) -> f32 {
         return shape;
     }
     let upper = UPPER && column.medium == UPPER_CLOUD;
-    let curl_at = select(frame.curl_origin, frame.upper_curl_origin, upper) + column.at.xy / params.clouds.curl_scale;
+    let curl_at = select(frame.sky.curl_origin, frame.sky.upper_curl_origin, upper) + column.at.xy / params.clouds.curl_scale;
     let swirl = textureSampleLevel(curl_noise, repeat_sampler, curl_at, 0.0).xy;
     let moved = column.at + vec3f(params.clouds.curl * (1.0 - column.height) * swirl, 0.0);
-    let at = select(frame.detail_origin, frame.upper_detail_origin, upper) + moved / params.clouds.detail_scale;
+    let at = select(frame.sky.detail_origin, frame.sky.upper_detail_origin, upper) + moved / params.clouds.detail_scale;
     let detail = detail_at(at, scaled(width, upper) / params.clouds.detail_scale);
     return with_share(column, eroded(shape, detail, column.height), shape);
 }
@@ -304,13 +304,13 @@ fn detail_at(at: vec3f, tiles: f32) -> f32 {
     return textureSampleLevel(detail_noise, repeat_sampler, at, log2(max(texels, 1.0))).r;
 }
 
-// The density of a medium as a share of `frame.extinction`: of cloud that has been eroded, or of rain, which is not.
+// The density of a medium as a share of `frame.sky.extinction`: of cloud that has been eroded, or of rain, which is not.
 fn with_share(column: Column, cloud: f32, rain: f32) -> f32 {
     if !(UPPER || RAIN_SHAFTS) {
         return cloud;
     }
-    var density = cloud * select(frame.share, frame.upper_share, column.medium == UPPER_CLOUD);
-    return select(density, rain * frame.rain_share, column.medium == RAIN);
+    var density = cloud * select(frame.sky.share, frame.sky.upper_share, column.medium == UPPER_CLOUD);
+    return select(density, rain * frame.sky.rain_share, column.medium == RAIN);
 }
 
 // The density with everything read.

@@ -22,14 +22,14 @@ struct Disc {
 }
 
 fn sun_disc() -> Disc {
-    return Disc(frame.sun_direction, SUN_RADIUS, frame.sun_bounds, params.sun.irradiance, LIMB, perpendicular(frame.sun_direction), 1.0);
+    return Disc(frame.sky.sun_direction, SUN_RADIUS, frame.view.sun_bounds, params.sun.irradiance, LIMB, perpendicular(frame.sky.sun_direction), 1.0);
 }
 
 // The moon's mean angular radius, 15.54 minutes of arc (as in moon.rs). A full one is as bright at its limb as in its middle.
 const MOON_RADIUS = 0.004520;
 
 fn moon_disc() -> Disc {
-    return Disc(frame.moon_direction, MOON_RADIUS, frame.moon_bounds, frame.moon_light, vec3f(0.0), frame.moon_bright, frame.moon_phase);
+    return Disc(frame.sky.moon_direction, MOON_RADIUS, frame.view.moon_bounds, frame.sky.moon_light, vec3f(0.0), frame.sky.moon_bright, frame.sky.moon_phase);
 }
 
 // Radiance that a pixel gets of the discs, on average, through the air.
@@ -50,7 +50,7 @@ fn disc_in_pixel(disc: Disc, corner: vec2f) -> vec3f {
     let plane = disc_plane(disc);
     var share = vec3f(0.0);
     for (var round = -rounds; round <= rounds; round++) {
-        let shift = vec2f(f32(round * i32(frame.width)), 0.0);
+        let shift = vec2f(f32(round * i32(frame.view.width)), 0.0);
         let low = max(corner + shift, disc.bounds.xy);
         let high = min(corner + shift + 1.0, disc.bounds.zw);
         if all(low < high) {
@@ -90,7 +90,7 @@ fn disc_transmittance(direction: vec3f) -> vec3f {
         return vec3f(1.0);
     }
     let way = air_way(direction);
-    let altitude = select(max(frame.altitude, 0.0), AIR_TOP, frame.power_air > 0.0);
+    let altitude = select(max(frame.view.altitude, 0.0), AIR_TOP, frame.view.power_air > 0.0);
     let through = air_transmittance(altitude, cos_zenith_along(direction, way.start, altitude));
     return select(vec3f(1.0), through, way.length > 0.0);
 }
@@ -107,20 +107,20 @@ struct DiscPlane {
 }
 
 fn disc_plane(disc: Disc) -> DiscPlane {
-    let sine = dot(disc.direction, frame.zenith);
-    let level = cross(disc.direction, frame.zenith);
+    let sine = dot(disc.direction, frame.view.zenith);
+    let level = cross(disc.direction, frame.view.zenith);
     let cosine = length(level);
     let right = select(perpendicular(disc.direction), level / max(cosine, 1e-6), cosine > 1e-6);
     let up = cross(right, disc.direction);
     let toward = to_local(disc.direction);
     let middle = select(toward, toward / max(toward.z, 1e-6), CAMERA != EQUIRECT && CAMERA != FISHEYE);
-    let horizon = -(sine + sin(frame.horizon_dip)) / max(cosine, 1e-6) / disc.radius;
+    let horizon = -(sine + sin(frame.view.horizon_dip)) / max(cosine, 1e-6) / disc.radius;
     let bright = vec2f(dot(disc.bright, right), dot(disc.bright, up));
     return DiscPlane(middle, toward, to_local(right), to_local(up), disc.radius, bright, horizon);
 }
 
 fn to_local(direction: vec3f) -> vec3f {
-    return vec3f(dot(direction, frame.right), dot(direction, frame.up), dot(direction, frame.forward));
+    return vec3f(dot(direction, frame.view.right), dot(direction, frame.view.up), dot(direction, frame.view.forward));
 }
 
 // Where in the plane the sky of a place in the picture is. The difference comes first, or narrow views lose their digits.

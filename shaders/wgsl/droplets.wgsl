@@ -14,7 +14,7 @@ fn droplet_phase(one_minus_mu: f32) -> f32 {
 // Jendersie and d'Eon 2023: Henyey and Greenstein's forward peak and Draine's body. With a `peak` less than 1, each lobe is
 // as much less one-sided: at 0, all directions are alike.
 fn droplet_fit(one_minus_mu: f32, peak: f32) -> f32 {
-    let d = frame.droplet;
+    let d = frame.sky.droplet;
     let forward = henyey_greenstein(one_minus_mu, peak * d.x);
     return mix(forward, draine(one_minus_mu, peak * d.y, peak * d.z), d.w);
 }
@@ -56,9 +56,9 @@ fn droplet_sample(u: vec2f) -> vec2f {
 fn droplet_fit_sample(u: vec2f) -> f32 {
     const MOST_TRIALS = 50u;
     let seed = bitcast<vec2u>(u);
-    let lobe = random3(vec3u(seed, 0u), 1u).x < frame.droplet.w;
-    let g = select(frame.droplet.x, frame.droplet.y, lobe);
-    let alpha = select(0.0, frame.droplet.z, lobe);
+    let lobe = random3(vec3u(seed, 0u), 1u).x < frame.sky.droplet.w;
+    let g = select(frame.sky.droplet.x, frame.sky.droplet.y, lobe);
+    let alpha = select(0.0, frame.sky.droplet.z, lobe);
     var i = 0u;
     var one_minus_mu = 0.0;
     loop {

@@ -11,12 +11,12 @@ const SHADOW_LEVELS = 5u;
 
 // The side of a texel of a level, m.
 fn shadow_texel(level: u32) -> f32 {
-    return frame.shadow_texel * f32(1u << level);
+    return frame.sky.shadow_texel * f32(1u << level);
 }
 
 // The ground under, or over, a place beside the eye.
 fn ground_place(xy: vec2f) -> vec3f {
-    let centre = frame.zenith * frame.centre_distance;
+    let centre = frame.view.zenith * frame.view.centre_distance;
     let across = length(centre.xy + xy);
     let r = params.atmosphere.planet_radius;
     let up = sqrt(max((r - across) * (r + across), 0.0));
@@ -46,7 +46,7 @@ fn shadow_level(q: vec2f, fine: f32) -> u32 {
 
 // How much sun reaches a point on the ground through the marched clouds.
 fn baked_ground_sun(p: vec3f) -> f32 {
-    let q = p.xy + frame.shadow_eye;
+    let q = p.xy + frame.sky.shadow_eye;
     return shadow_in_level(q, shadow_level(q, 0.0)).x;
 }
 
@@ -56,7 +56,7 @@ fn baked_air_sun(p: vec3f, altitude: f32, mu_sun: f32, fine: f32) -> f32 {
     let radius = params.atmosphere.planet_radius;
     let down = crossing(-(radius + altitude) * mu_sun, max(altitude, 0.0) * (2.0 * radius + altitude));
     const BEYOND = vec2f(1e9);
-    let q = select(BEYOND, p.xy - down.near * frame.sun_direction.xy + frame.shadow_eye, down.enters);
+    let q = select(BEYOND, p.xy - down.near * frame.sky.sun_direction.xy + frame.sky.shadow_eye, down.enters);
     let baked = shadow_in_level(q, shadow_level(q, fine));
     let x = 4.0 * height_among_clouds(p, altitude);
     return dot(saturate(1.0 - abs(max(x, 0.0) - vec4f(0.0, 1.0, 2.0, 3.0))), baked) + saturate(x - 3.0);
@@ -65,9 +65,9 @@ fn baked_air_sun(p: vec3f, altitude: f32, mu_sun: f32, fine: f32) -> f32 {
 // A height from the lowest marched clouds, 0, to the highest, 1.
 fn height_among_clouds(p: vec3f, altitude: f32) -> f32 {
     if VOLUME {
-        return (p.z - frame.volume_low.z) / (frame.volume_high.z - frame.volume_low.z);
+        return (p.z - frame.sky.volume_low.z) / (frame.sky.volume_high.z - frame.sky.volume_low.z);
     }
-    return (altitude - frame.shell_base) / (frame.shell_top - frame.shell_base);
+    return (altitude - frame.sky.shell_base) / (frame.sky.shell_top - frame.sky.shell_base);
 }
 
 // Share of the sun that the clouds in its way scatter on to the ground: that of stratus (Haurwitz 1948: stratus 0.25,
@@ -79,8 +79,8 @@ const PASSED_ON = 0.25;
 fn high_depth_over(p: vec3f, mu_sun: f32) -> f32 {
     let radius = params.atmosphere.planet_radius;
     let altitude = params.high_clouds.altitude;
-    let q = p + crossing(radius * mu_sun, -altitude * (2.0 * radius + altitude)).far * frame.sun_direction;
-    let slant = max(abs(cos_zenith_at(q, frame.sun_direction)), 0.02);
+    let q = p + crossing(radius * mu_sun, -altitude * (2.0 * radius + altitude)).far * frame.sky.sun_direction;
+    let slant = max(abs(cos_zenith_at(q, frame.sky.sun_direction)), 0.02);
     return high_optical_depth(q) / slant;
 }
 

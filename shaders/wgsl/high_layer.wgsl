@@ -28,18 +28,18 @@ fn high_optical_depth(p: vec3f) -> f32 {
 }
 
 fn high_cloud_at(p: vec3f, emboss: bool) -> HighCloud {
-    let along = frame.high_direction;
+    let along = frame.sky.high_direction;
     let across = vec2f(-along.y, along.x);
     let place = on_chart(p, params.high_clouds.altitude);
     let tiles = vec2f(dot(place, along), dot(place, across)) / params.high_clouds.scale;
     // A second read at another scale breaks the tiles up.
-    let broad = textureSampleLevel(high_map, repeat_sampler, frame.high_broad_origin + tiles / BROAD, 0.0).r;
-    let uv = frame.high_origin + tiles;
+    let broad = textureSampleLevel(high_map, repeat_sampler, frame.sky.high_broad_origin + tiles / BROAD, 0.0).r;
+    let uv = frame.sky.high_origin + tiles;
     let thickness = high_thickness(mix(textureSampleLevel(high_map, repeat_sampler, uv, 0.0).r, broad, BROAD_SHARE));
     var relief = 0.0;
     if emboss {
         // The sun's direction on the layer, the shorter the higher it stands: straight above there is no relief.
-        let sun = vec2f(dot(frame.sun_direction.xy, along), dot(frame.sun_direction.xy, across));
+        let sun = vec2f(dot(frame.sky.sun_direction.xy, along), dot(frame.sky.sun_direction.xy, across));
         let nearer = textureSampleLevel(high_map, repeat_sampler, uv + EMBOSS_STEP * sun, 0.0).r;
         relief = thickness - high_thickness(mix(nearer, broad, BROAD_SHARE));
     }

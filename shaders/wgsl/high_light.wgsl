@@ -38,13 +38,13 @@ fn high_layer(direction: vec3f, distance: f32, visible: bool, turned: Turn) -> L
     let p = select(vec3f(0.0), distance * direction, visible);
     let cosine = cos_zenith_along(direction, distance, params.high_clouds.altitude);
     // An eye that climbs through a layer without thickness would see it jump from above to below: near it, it fades.
-    let fade = saturate(abs(frame.altitude - params.high_clouds.altitude) / HIGH_FADE);
+    let fade = saturate(abs(frame.view.altitude - params.high_clouds.altitude) / HIGH_FADE);
     let high = high_cloud_at(p, HIGH_EMBOSS);
     let optical_depth = select(0.0, fade * high.optical_depth, visible);
     let along = optical_depth / max(abs(cosine), 0.02);
     let transmittance = transmittance_of(along);
 
-    let mu_sun = cos_zenith_at(p, frame.sun_direction);
+    let mu_sun = cos_zenith_at(p, frame.sky.sun_direction);
     let depth = depth_to_sun(along, optical_depth / max(abs(mu_sun), HIGH_GRAZING), select(-mu_sun, mu_sun, cosine > 0.0));
     var sun = seen_scattering(depth, 0.0, turned) * high_sun(mu_sun);
     if HIGH_EMBOSS {
@@ -82,6 +82,6 @@ fn high_sun(mu_sun: f32) -> vec3f {
         return sky_light_uniform[3].rgb;
     }
     // Hundreds of kilometres away it stands degrees higher or lower, and has set or not.
-    let here = dot(frame.zenith, frame.sun_direction);
+    let here = dot(frame.view.zenith, frame.sky.sun_direction);
     return sun_irradiance(params.high_clouds.altitude, mix(mu_sun, here, smoothstep(LOW_SUN.x, LOW_SUN.y, here)));
 }

@@ -11,7 +11,7 @@ fn spacing() -> u32 {
 
 // How many are known in this picture.
 fn known_size() -> vec2u {
-    return known_size_by(vec2u(frame.width, frame.height), spacing());
+    return known_size_by(vec2u(frame.view.width, frame.view.height), spacing());
 }
 
 // How many are known in a picture of `size` pixels. Those of a sparse one go up to a cell beyond its right and lower edges, so

@@ -27,7 +27,7 @@ fn optical_depth_to_sun(p: vec3f, opacity: f32, width: f32) -> f32 {
     // Behind little cloud the near samples see the detail; the others are cheap.
     // So are those that stand for most of a tile of the detail, over which it is its mean.
     let fine = detailed_samples(samples);
-    let full = select(0u, fine, opacity < quality.cheap_light);
+    let full = select(0u, fine, opacity < params.quality.cheap_light);
     // Loops are tested at their end: one that is tested at its start runs once more on lavapipe.
     var i = 0u;
     if LIGHT_DETAIL && full > 0u {
@@ -40,17 +40,17 @@ fn optical_depth_to_sun(p: vec3f, opacity: f32, width: f32) -> f32 {
             }
         }
     }
-    if LIGHT_CHEAP && i < n + quality.far_sample {
+    if LIGHT_CHEAP && i < n + params.quality.far_sample {
         loop {
             let at = light_sample(samples, p, i, width);
             depth += cloud_density_cheap(at.p, at.altitude) * at.length;
             i += 1u;
-            if i >= n + quality.far_sample {
+            if i >= n + params.quality.far_sample {
                 break;
             }
         }
     }
-    depth *= frame.extinction;
+    depth *= frame.sky.extinction;
     return depth;
 }
 
@@ -68,21 +68,21 @@ struct LightSamples {
 const NEAR = 150.0;
 
 fn light_samples(p: vec3f) -> LightSamples {
-    let n = quality.light_steps;
-    if quality.light_distance > 0.0 {
-        return LightSamples(quality.light_distance, 0.0, n, vec2f(0.0), n);
+    let n = params.quality.light_steps;
+    if params.quality.light_distance > 0.0 {
+        return LightSamples(params.quality.light_distance, 0.0, n, vec2f(0.0), n);
     }
-    let s = cloud_stretches_from(p, frame.sun_direction);
+    let s = cloud_stretches_from(p, frame.sky.sun_direction);
     var reach = s.start + s.first + s.gap + s.second;
     var count = n;
     var above = vec2f(0.0);
-    if UPPER && altitude_at(p) < frame.lower_top {
+    if UPPER && altitude_at(p) < frame.sky.lower_top {
         // A third more samples: of those as long as they are far, one or none would meet that deck. With them, `draft` errs by
         // 26 % in `two_decks`, not 14. Were they of the others, those would lie elsewhere as soon as there is such a deck.
         count = n + (n + 2u) / 3u;
-        let begin = hit_sphere_from(p, frame.sun_direction, max(params.upper_clouds.base, frame.lower_top)).far;
+        let begin = hit_sphere_from(p, frame.sky.sun_direction, max(params.upper_clouds.base, frame.sky.lower_top)).far;
         above = vec2f(min(begin, reach), reach);
-        reach = min(hit_sphere_from(p, frame.sun_direction, frame.lower_top).far, reach);
+        reach = min(hit_sphere_from(p, frame.sky.sun_direction, frame.sky.lower_top).far, reach);
     }
     return LightSamples(reach, log2(1.0 + reach / NEAR) / f32(n), n, above, count);
 }
@@ -126,7 +126,7 @@ fn light_sample(samples: LightSamples, p: vec3f, i: u32, width: f32) -> LightSam
     let is_far = i == samples.count;
     let length = select(b - a, 4.0 * reach, is_far);
     let s = select(0.5 * (a + b), 3.0 * reach, is_far);
-    let at = p + s * (frame.sun_direction + quality.cone * CONE[i % 6u]);
+    let at = p + s * (frame.sky.sun_direction + params.quality.cone * CONE[i % 6u]);
     return LightSample(at, altitude_at(at), length, max(width, 0.5 * length));
 }
 
@@ -158,17 +158,17 @@ struct Turn {
 
 // Of the light that a pixel sees, given by its corner.
 fn seen_turn(direction: vec3f, corner: vec2f) -> Turn {
-    let one_minus_mu = one_minus_cos(direction, frame.sun_direction);
+    let one_minus_mu = one_minus_cos(direction, frame.sky.sun_direction);
     if !WIDE_PHASE {
         return Turn(one_minus_mu, model_phase(one_minus_mu));
     }
-    let n = frame.phase_samples;
+    let n = frame.view.phase_samples;
     var sum = 0.0;
     var whole = 0.0;
     for (var i = 0u; i < n * n; i++) {
         let at = corner + (vec2f(vec2u(i % n, i / n)) + 0.5) / f32(n);
         let weight = place_weight(at);
-        sum += weight * model_phase(one_minus_cos(view_direction(at).xyz, frame.sun_direction));
+        sum += weight * model_phase(one_minus_cos(view_direction(at).xyz, frame.sky.sun_direction));
         whole += weight;
     }
     return Turn(one_minus_mu, sum / whole);
@@ -308,7 +308,7 @@ fn radiance_through_air(sum: Gathered, nodes: Nodes, direction: vec3f) -> vec3f 
         let air = air_of(depth, distance, way, texels, sky);
         let p = distance * direction;
         let h = altitude_at(p);
-        let mu = cos_zenith_at(p, frame.sun_direction);
+        let mu = cos_zenith_at(p, frame.sky.sun_direction);
         var light = sum.sun[k] * sun_irradiance(h, mu);
         if MODEL != MODEL_SINGLE {
             light += sum.above[k] * ambient_above(clouded_sky(light_from_above(h, mu)));

@@ -59,7 +59,7 @@ fn read_panel(panel: Panel, origin: vec3f, direction: vec3f, s: Stretches, width
 
 // The optical depth of a panel.
 fn panel_depth(panel: Panel, density: vec2f) -> f32 {
-    return frame.extinction * (panel.end - panel.begin) * 0.5 * (density.x + density.y);
+    return frame.sky.extinction * (panel.end - panel.begin) * 0.5 * (density.x + density.y);
 }
 
 // The share of a panel's weight that its first point has: each point weighs what it scatters times what of it gets out,
@@ -96,6 +96,6 @@ fn thinnest_deck() -> f32 {
 // rim of the spot that is kept clear.
 fn coarsest_panel() -> f32 {
     let texel = select(1.0, params.upper_clouds.scale, UPPER) * params.weather.extent / f32(textureDimensions(weather_map).x);
-    let rim = select(1e30, 0.5 * frame.clear_radius, KEEP_CLEAR);
+    let rim = select(1e30, 0.5 * frame.sky.clear_radius, KEEP_CLEAR);
     return max(min(min(thinnest_deck() / 16.0, 2.0 * texel), rim), 2.0 * finest_feature());
 }

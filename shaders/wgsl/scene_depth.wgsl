@@ -17,12 +17,12 @@ fn scene_distance(pixel: vec2u) -> f32 {
 
 // Radiance of the scene at a pixel, none where it is not known.
 fn scene_radiance(pixel: vec2u) -> vec3f {
-    let lit = frame.scene_lit > 0u;
+    let lit = frame.view.scene_lit > 0u;
     return select(vec3f(0.0), textureLoad(scene_color, select(vec2u(0u), scene_texel(pixel), lit), 0).rgb, lit);
 }
 
 fn scene_texel(pixel: vec2u) -> vec2u {
-    return scene_texel_of((pixel.y - frame.sheet_row) * frame.width + pixel.x);
+    return scene_texel_of((pixel.y - dispatch.sheet_row) * frame.view.width + pixel.x);
 }
 
 // The texel of the pixel with that number in the sheet.

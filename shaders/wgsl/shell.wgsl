@@ -27,7 +27,7 @@ fn crossing(b: f32, power: f32) -> Hit {
 
 // Where a ray from the camera crosses the sphere whose power is `power`.
 fn hit_sphere(direction: vec3f, power: f32) -> Hit {
-    return crossing(frame.centre_distance * dot(frame.zenith, direction), power);
+    return crossing(frame.view.centre_distance * dot(frame.view.zenith, direction), power);
 }
 
 // Where a ray from a point crosses the sphere at an altitude.
@@ -49,20 +49,20 @@ fn hit_ground_from(p: vec3f, direction: vec3f) -> Hit {
 
 // Altitude of a point. The planet's centre is as far from itself as a millimetre: 0 / 0 is no altitude.
 fn altitude_at(p: vec3f) -> f32 {
-    let rh = frame.centre_distance;
-    let d = dot(p, p) + 2.0 * rh * dot(frame.zenith, p);
-    return frame.altitude + d / max(rh + sqrt(max(rh * rh + d, 0.0)), 1e-3);
+    let rh = frame.view.centre_distance;
+    let d = dot(p, p) + 2.0 * rh * dot(frame.view.zenith, p);
+    return frame.view.altitude + d / max(rh + sqrt(max(rh * rh + d, 0.0)), 1e-3);
 }
 
 // Cosine between a unit direction and the local zenith at a point.
 fn cos_zenith_at(p: vec3f, direction: vec3f) -> f32 {
-    let up = frame.zenith * frame.centre_distance + p;
+    let up = frame.view.zenith * frame.view.centre_distance + p;
     return dot(up, direction) / max(length(up), 1.0);
 }
 
 // The same for a ray from the camera and its own point at a distance, whose altitude is known: no square root.
 fn cos_zenith_along(direction: vec3f, distance: f32, altitude: f32) -> f32 {
-    return (frame.centre_distance * dot(frame.zenith, direction) + distance) / (params.atmosphere.planet_radius + altitude);
+    return (frame.view.centre_distance * dot(frame.view.zenith, direction) + distance) / (params.atmosphere.planet_radius + altitude);
 }
 
 // The part of a ray where there can be cloud: up to two stretches, the second after the ray has passed under the base.
@@ -76,12 +76,12 @@ struct Stretches {
 
 // Of a ray from the camera, to the ground at most.
 fn cloud_stretches(direction: vec3f) -> Stretches {
-    let ground = hit_sphere(direction, frame.power_ground);
+    let ground = hit_sphere(direction, frame.view.power_ground);
     let end = select(1e30, ground.near, ground.enters);
     if VOLUME {
         return box_stretch(vec3f(0.0), direction, end);
     }
-    return stretches_between(hit_sphere(direction, frame.power_top), hit_sphere(direction, frame.power_base), end);
+    return stretches_between(hit_sphere(direction, frame.view.power_top), hit_sphere(direction, frame.view.power_base), end);
 }
 
 // Of a ray from a point, as if there were no ground.
@@ -90,8 +90,8 @@ fn cloud_stretches_from(p: vec3f, direction: vec3f) -> Stretches {
         return box_stretch(p, direction, 1e30);
     }
     return stretches_between(
-        hit_sphere_from(p, direction, frame.shell_top),
-        hit_sphere_from(p, direction, frame.shell_base),
+        hit_sphere_from(p, direction, frame.sky.shell_top),
+        hit_sphere_from(p, direction, frame.sky.shell_base),
         1e30,
     );
 }
@@ -115,8 +115,8 @@ fn stretches_between(outer: Hit, inner: Hit, limit: f32) -> Stretches {
 // Through the box of the user's grid. A direction along a face divides by a number that is small, not zero (hazard 17).
 fn box_stretch(p: vec3f, direction: vec3f, limit: f32) -> Stretches {
     let d = select(direction, vec3f(1e-20), abs(direction) < vec3f(1e-20));
-    let a = (frame.volume_low - p) / d;
-    let b = (frame.volume_high - p) / d;
+    let a = (frame.sky.volume_low - p) / d;
+    let b = (frame.sky.volume_high - p) / d;
     let near = min(a, b);
     let far = max(a, b);
     let start = max(max(near.x, near.y), max(near.z, 0.0));

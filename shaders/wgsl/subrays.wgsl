@@ -13,8 +13,8 @@ fn rays_through(view: vec3f) -> f32 {
     if !SUBRAYS {
         return 1.0;
     }
-    let width = cloud_stretches(view).start * pixel_width(view) * f32(spacing()) / (CLOUD_WIDTH * frame.leap_scale);
-    return clamp(ceil(width * width), 1.0, frame.most_rays);
+    let width = cloud_stretches(view).start * pixel_width(view) * f32(spacing()) / (CLOUD_WIDTH * frame.sky.leap_scale);
+    return clamp(ceil(width * width), 1.0, frame.view.most_rays);
 }
 
 // Where in its pixel, or in what stands for it where not all are known, a ray lies; one alone in the middle.

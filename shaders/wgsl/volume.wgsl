@@ -2,13 +2,13 @@
 #import bindings
 
 fn in_volume(p: vec3f) -> bool {
-    return all(p >= frame.volume_low) && all(p <= frame.volume_high);
+    return all(p >= frame.sky.volume_low) && all(p <= frame.sky.volume_high);
 }
 
 // Where a point lies, in voxels: a whole number at the centre of each, so that the value is a cubic along a ray between
 // two whole numbers.
 fn volume_cell(p: vec3f) -> vec3f {
-    return (p - frame.volume_low) * frame.volume_scale - 0.5;
+    return (p - frame.sky.volume_low) * frame.sky.volume_scale - 0.5;
 }
 
 // The density in the box, 1 at the largest extinction. Outside it the value of its nearest face.
@@ -43,7 +43,7 @@ fn volume_texel(x: i32, y: i32, z: i32) -> f32 {
 // for which two Gauss points are exact. Planes come from whole numbers, so that no error adds up (hazard 17).
 fn next_plane(origin: vec3f, direction: vec3f, t: f32) -> f32 {
     let start = volume_cell(origin);
-    let speed = direction * frame.volume_scale;
+    let speed = direction * frame.sky.volume_scale;
     var next = 1e30;
     for (var axis = 0; axis < 3; axis++) {
         let v = speed[axis];

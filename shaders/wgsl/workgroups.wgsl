@@ -5,9 +5,9 @@
 // its threads as many workgroups in a row, and waits for the slower (Mesa, lp_cs_tpool.c): without this one of two has
 // the sky above and the other the clouds below. The march of `above` took 76 ms, and takes 59.
 fn spread(number: u32, count: u32) -> u32 {
-    let length = max(count / frame.threads, 1u);
-    let part = number % length * frame.threads + number / length;
-    return select(number, part, number < length * frame.threads);
+    let length = max(count / dispatch.threads, 1u);
+    let part = number % length * dispatch.threads + number / length;
+    return select(number, part, number < length * dispatch.threads);
 }
 
 // The same for a picture of `groups`, in which they are numbered row by row.

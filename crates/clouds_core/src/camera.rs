@@ -8,9 +8,10 @@ use glam::DVec3;
 use crate::error::{Error, Result};
 
 /// How pixels become directions. The discriminants are those of `camera.wgsl`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Default, Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Projection {
     /// A pinhole; `fov` is the vertical field of view.
+    #[default]
     Perspective = 0,
     /// The whole sphere by longitude and latitude: image centre north, right clockwise from above.
     Equirect = 1,

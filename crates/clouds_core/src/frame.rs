@@ -1,5 +1,5 @@
-//! What the renderer knows about a frame and its user does not set: the `frame` uniform. Everything that would lose
-//! its digits in f32 (planet radii, long times, distant eyes) is worked out here in f64.
+//! What the renderer knows about a frame and its user does not set. Everything that would lose its digits in f32 (planet radii,
+//! long times, distant eyes) is worked out here in f64.
 
 use std::f32::consts::PI;
 use std::f64::consts::{FRAC_PI_2, PI as PI64};
@@ -14,262 +14,36 @@ use crate::moon::MOON_RADIUS;
 use crate::params;
 use crate::params::{Edge, Model, Params, Phase};
 use crate::passes::refine;
-use crate::schema::{self, Block as _};
+use crate::uniforms::{Dispatch, Sky, View, uniform};
 use crate::wind::Carried;
 
-params! {
-    /// What the renderer knows about a frame.
-    Frame {
-        /// Width of the picture in pixels.
-        width: u32 = 1;
-        /// Height of the picture in pixels.
-        height: u32 = 1;
-        /// First row of this band of the picture (of the marched rows, in `march`).
-        first_row: u32 = 0;
-        /// Rows of this band.
-        rows: u32 = 1;
-        /// First column of the pixels of a disc of light (passes/composite).
-        first_column: u32 = 0;
-        /// How many columns they are.
-        columns: u32 = 1;
-        /// First row that the buffers hold: where this sheet begins (of the marched rows, in `march`).
-        sheet_row: u32 = 0;
-        /// Rows that they hold.
-        sheet_rows: u32 = 1;
-        /// Every how many pixels one is marched, in both directions.
-        stride: u32 = 1;
-        /// Which of them, across.
-        subpixel_x: u32 = 0;
-        /// Which of them, down.
-        subpixel_y: u32 = 0;
-        /// Pixels marched in a row.
-        march_width: u32 = 1;
-        /// Every how many of those a ray is known, in both directions (passes/refine).
-        lattice: u32 = 1;
-        /// 1 where the clouds are known at the corners of cells of pixels alone, for which kernels are compiled (lattice.wgsl).
-        sparse: u32 = 0;
-        /// 1 when the rays look for cloud where their neighbours have found it, 0 when they look everywhere.
-        spans: u32 = 0;
-        /// 1 to put the clouds before the sky, 0 to return them alone.
-        background: u32 = 1;
-        /// 1 where eye, view, clouds or the user's scene have moved since the frame before.
-        moving: u32 = 0;
-
-        /// Most rays through a pixel that is wider than clouds (subrays.wgsl).
-        most_rays: f32 = 1.0;
-        /// Threads among which the device shares the workgroups of a dispatch, 1 unless it is a processor (workgroups.wgsl).
-        threads: u32 = 1;
-        /// Rays of the list in this dispatch (passes/march, passes/reference, passes/path).
-        active_rays: u32 = 0;
-        /// The first of them (passes/march).
-        first_ray: u32 = 0;
-        /// Turns that each may take.
-        budget: u32 = 0;
-        /// Number of the first path of each pixel (passes/path).
-        first_sample: u32 = 0;
-
-        /// Projection, as in camera.wgsl, for which kernels are compiled.
-        camera_kind: u32 = 0;
-        /// 1 where there are high clouds, for which `composite` is compiled.
-        high_clouds: u32 = 0;
-        /// 1 where they are embossed and the sun reaches any of them in sight, for which `composite` is compiled.
-        high_emboss: u32 = 0;
-        /// 1 where the sun is so low that it shines on each of them in its own way, for which `composite` is compiled.
-        high_low_sun: u32 = 0;
-        /// 1 where nothing has been marched, as there are no clouds, for which `composite` is compiled.
-        cloudless: u32 = 0;
-        /// Tangent of half the vertical field of view.
-        tan_half_fov: f32 = 1.0;
-        /// Half the field of view of a fisheye in radians.
-        half_fov: f32 = 1.0;
-        /// Camera axis.
-        right: [f32; 3] = [1.0, 0.0, 0.0];
-        /// Camera axis.
-        up: [f32; 3] = [0.0, 0.0, 1.0];
-        /// Camera axis.
-        forward: [f32; 3] = [0.0, 1.0, 0.0];
-
-        /// The same of the frame before.
-        previous_right: [f32; 3] = [1.0, 0.0, 0.0];
-        /// The same of the frame before.
-        previous_up: [f32; 3] = [0.0, 0.0, 1.0];
-        /// The same of the frame before.
-        previous_forward: [f32; 3] = [0.0, 1.0, 0.0];
-        /// The same of the frame before.
-        previous_tan_half_fov: f32 = 1.0;
-        /// The same of the frame before.
-        previous_half_fov: f32 = 1.0;
-        /// Width of the frame before, where it had another size.
-        previous_width: u32 = 1;
-        /// Its height.
-        previous_height: u32 = 1;
-        /// Pixels from one that its clouds were known at to the next.
-        previous_spacing: u32 = 1;
-        /// Frames in which each of those was marched once.
-        previous_round: u32 = 1;
-        /// How far the eye has moved since the frame before, m.
-        eye_motion: [f32; 3] = [0.0, 0.0, 0.0];
-        /// How far the wind has carried the clouds since the frame before, m.
-        cloud_motion: [f32; 3] = [0.0, 0.0, 0.0];
-        /// Distance at which pixels without clouds are reprojected, m.
-        far_distance: f32 = 100000.0;
-
-        /// Unit vector away from the planet's centre, at the eye.
-        zenith: [f32; 3] = [0.0, 0.0, 1.0];
-        /// Altitude of the eye, m.
-        altitude: f32 = 0.0;
-        /// Distance of the eye from the planet's centre, m.
-        centre_distance: f32 = 6371000.0;
-        /// Angle of the horizon below the horizontal at the eye, radians.
-        horizon_dip: f32 = 0.0;
-        /// Power of the eye's point for the ground: (h - H)(2R + h + H) for a sphere at altitude H, m^2.
-        power_ground: f32 = 0.0;
-        /// The same for the lowest clouds.
-        power_base: f32 = 0.0;
-        /// The same for the highest.
-        power_top: f32 = 0.0;
-        /// The same for the highest that shade the air, be they procedural or the user's.
-        power_shade: f32 = 0.0;
-        /// The same for the high clouds.
-        power_high: f32 = 0.0;
-        /// The same for the top of the air.
-        power_air: f32 = 0.0;
-
-        /// The distance of the eye from the planet's centre and the part of it along the axis through the origin, together, m
-        /// (chart.wgsl).
-        chart_reach: f32 = 12742000.0;
-        /// Where the eye is beside that axis, as a share of it: east and north.
-        chart_slope: [f32; 2] = [0.0, 0.0];
-
-        /// Lowest altitude of procedural clouds and rain, m.
-        shell_base: f32 = 0.0;
-        /// Highest.
-        shell_top: f32 = 1.0;
-        /// Highest altitude of the first deck, m.
-        lower_top: f32 = 1.0;
-        /// How much the second deck shows, 0 where its cover is 0.
-        upper_shown: f32 = 0.0;
-        /// How far rain falls, as a share of its way to the ground.
-        rain_reach: f32 = 0.0;
-
-        /// The shortest of the scales by which the base shape varies: of what `quality.leap` is a share, m.
-        leap_scale: f32 = 1.0;
-
-        /// Extinction where the density is 1: the largest of clouds, upper clouds and rain, 1/m.
-        extinction: f32 = 0.0;
-        /// That of the clouds as a share of it.
-        share: f32 = 1.0;
-        /// That of the upper clouds.
-        upper_share: f32 = 0.0;
-        /// That of the rain.
-        rain_share: f32 = 0.0;
-        /// Lowest corner of the user's grid, relative to the eye, m.
-        volume_low: [f32; 3] = [0.0; 3];
-        /// Highest corner.
-        volume_high: [f32; 3] = [0.0; 3];
-        /// Its voxels in a metre along each axis.
-        volume_scale: [f32; 3] = [0.0; 3];
-        /// The shortest side of a voxel, m.
-        voxel: f32 = 0.0;
-
-        /// Of the fit of cloud droplets (droplets.wgsl): g of its Henyey-Greenstein lobe, g and alpha of Draine's, and the
-        /// share of that.
-        droplet: [f32; 4] = [0.0; 4];
-
-        /// By what the sky map is multiplied (atmosphere.wgsl).
-        sky_scale: f32 = 1024.0;
-        /// By what it is divided: irradiance.
-        sky_unit: [f32; 3] = [1.0; 3];
-        /// Unit vector toward the sun.
-        sun_direction: [f32; 3] = [0.0, 0.0, 1.0];
-        /// The same of the frame before.
-        previous_sun: [f32; 3] = [0.0, 0.0, 1.0];
-        /// The middle of the spot to keep clear, relative to the eye, m.
-        clear_at: [f32; 2] = [0.0, 0.0];
-        /// Its radius, m.
-        clear_radius: f32 = 0.0;
-        /// Unit vector toward which the wind blows.
-        wind_direction: [f32; 2] = [0.0, 1.0];
-        /// Where the eye stands in the base shape's tile, after the wind, with the z of altitude 0.
-        shape_origin: [f32; 3] = [0.0, 0.0, 0.0];
-        /// The same in the detail's tile.
-        detail_origin: [f32; 3] = [0.0, 0.0, 0.0];
-        /// The same in the curl noise's tile.
-        curl_origin: [f32; 2] = [0.0, 0.0];
-        /// The same in the weather map (v down).
-        weather_origin: [f32; 2] = [0.0, 0.0];
-        /// Where the eye stands in the larger weather map (v down).
-        broad_origin: [f32; 2] = [0.0, 0.0];
-        /// By what its texels are multiplied.
-        broad_scale: f32 = 0.0;
-        /// The most that it shifts anything by.
-        broad_most: f32 = 0.0;
-        /// By how many of its tiles the smaller one is bent where the larger map's alpha is 1.
-        broad_bend: f32 = 0.0;
-        /// How much longer at most a way in the smaller map becomes by that.
-        broad_stretch: f32 = 0.0;
-        /// How far the rain has fallen, in the noise, which is squeezed along its streaks, m.
-        rain_fall: f32 = 0.0;
-        /// Unit vector toward which the upper deck's wind blows.
-        upper_direction: [f32; 2] = [0.0, 1.0];
-        /// As `shape_origin`, for the upper deck.
-        upper_shape_origin: [f32; 3] = [0.0, 0.0, 0.0];
-        /// As `detail_origin`.
-        upper_detail_origin: [f32; 3] = [0.0, 0.0, 0.0];
-        /// As `curl_origin`.
-        upper_curl_origin: [f32; 2] = [0.0, 0.0];
-        /// As `weather_origin`.
-        upper_weather_origin: [f32; 2] = [0.0, 0.0];
-        /// The same in the high clouds' texture, along and across their wind.
-        high_origin: [f32; 2] = [0.0, 0.0];
-        /// The same in the second, broader read of that texture.
-        high_broad_origin: [f32; 2] = [0.0, 0.0];
-        /// Unit vector along the high clouds' wind.
-        high_direction: [f32; 2] = [0.0, 1.0];
-        /// How far each of the four large octaves of the high clouds is from its old update to its new one.
-        high_age: [f32; 4] = [0.0; 4];
-        /// The same for the four small ones.
-        high_age_small: [f32; 4] = [0.0; 4];
-        /// Number of the old update of the large octaves.
-        high_update: [f32; 4] = [0.0; 4];
-        /// The same for the small ones.
-        high_update_small: [f32; 4] = [0.0; 4];
-
-        /// Left, top, right and bottom of a part of the picture that holds the sun's disc, pixels; of a panorama maybe beyond its
-        /// sides. Nothing where it is not in the picture.
-        sun_bounds: [f32; 4] = [0.0; 4];
-        /// The same of the moon's.
-        moon_bounds: [f32; 4] = [0.0; 4];
-        /// Unit vector toward the moon.
-        moon_direction: [f32; 3] = [0.0, 0.0, 1.0];
-        /// Its irradiance.
-        moon_light: [f32; 3] = [0.0; 3];
-        /// Unit vector at right angles to that toward the moon, to the side of it that the sun lights.
-        moon_bright: [f32; 3] = [1.0, 0.0, 0.0];
-        /// Cosine of the angle at the moon between sun and eye: 1 when it is full.
-        moon_phase: f32 = 1.0;
-        /// In how many directions, across and down, each pixel looks at the sky (passes/composite).
-        sky_samples: u32 = 1;
-        /// The same of the phase function (light.wgsl).
-        phase_samples: u32 = 1;
-
-        /// 1 where there is a scene of the user's, for which kernels are compiled.
-        scene: u32 = 0;
-        /// 1 where its radiance is known.
-        scene_lit: u32 = 0;
-        /// 1 where clouds cast shadows on the ground in sight, for which `composite` is compiled.
-        ground_shadow: u32 = 0;
-        /// 1 where clouds cast shadows on the air in sight, for which kernels are compiled.
-        beams: u32 = 0;
-        /// Distance from which on rays may meet such air, m.
-        beam_start: f32 = 0.0;
-        /// How much farther away the last of it is, m.
-        beam_length: f32 = 1.0;
-        /// Side of a texel of the user's shadow map, or of the finest level of the ground's (ground_shadow.wgsl), m.
-        shadow_texel: f32 = 1.0;
-        /// Where the eye is in those levels, after the wind, m from their middle.
-        shadow_eye: [f32; 2] = [0.0; 2];
-    }
+/// A frame of a picture or of an answer: its uniform blocks, and what its kernels are compiled for.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Frame {
+    /// Eye, camera and planet.
+    pub view: View,
+    /// Sun, moon, clouds and winds.
+    pub sky: Sky,
+    /// Which pixels a dispatch is for, unless it says otherwise: all of the strip.
+    pub dispatch: Dispatch,
+    /// How the camera projects.
+    pub projection: Projection,
+    /// The clouds are known at the corners of cells of pixels alone (lattice.wgsl).
+    pub sparse: bool,
+    /// There are high clouds.
+    pub high_clouds: bool,
+    /// They are embossed, and the sun reaches any of them in sight.
+    pub high_emboss: bool,
+    /// The sun is so low that it shines on each of them in its own way.
+    pub high_low_sun: bool,
+    /// Nothing is marched, as there are no clouds.
+    pub cloudless: bool,
+    /// There is a scene of the user's.
+    pub scene: bool,
+    /// Clouds cast shadows on the ground in sight.
+    pub ground_shadow: bool,
+    /// Clouds cast shadows on the air in sight.
+    pub beams: bool,
 }
 
 /// How much larger the second read of the high clouds' texture is than the first (as in high_layer.wgsl).
@@ -408,16 +182,16 @@ fn on_chart(at: DVec3, params: &Params) -> DVec2 {
 }
 
 impl Frame {
-    /// The uniform block.
-    pub(crate) fn block(&self, gpu: &Gpu) -> Binding {
-        let mut words = vec![0; schema::size(Self::FIELDS) / 4];
-        Self { threads: gpu.threads, ..self.clone() }.write(&mut words);
-        Binding::block(&words)
+    /// Its uniform blocks.
+    pub(crate) fn bindings(&self, gpu: &Gpu) -> [(&'static str, Binding); 2] {
+        [("frame", uniform(&[&self.view, &self.sky])), self.dispatch.binding(gpu)]
     }
 
     /// What the camera and the size of a picture say of it.
     pub fn seen_by(camera: &Camera, [width, height]: [u32; 2]) -> Self {
-        let mut frame = Self { width, height, rows: height, march_width: width, ..Self::default() };
+        let mut frame = Self::default();
+        [frame.view.width, frame.view.height] = [width, height];
+        frame.dispatch = Dispatch { rows: height, march_width: width, ..Dispatch::default() };
         frame.set_camera(camera);
         frame
     }
@@ -428,15 +202,15 @@ impl Frame {
         frame.set_planet(camera.eye, params);
         frame.set_wind(camera.eye, params, time);
         frame.set_volume(camera.eye, params);
-        frame.leap_scale = leap_scale(params);
-        frame.shadow_texel = shadow::texel(frame.altitude);
-        frame.shadow_eye = shadow::eye_in(camera.eye, params, time);
-        frame.high_clouds = u32::from(params.has_high_clouds());
-        frame.sun_direction = sun_direction(params).as_vec3().to_array();
+        frame.sky.leap_scale = leap_scale(params);
+        frame.sky.shadow_texel = shadow::texel(frame.view.altitude);
+        frame.sky.shadow_eye = shadow::eye_in(camera.eye, params, time);
+        frame.high_clouds = params.has_high_clouds();
+        frame.sky.sun_direction = sun_direction(params).as_vec3().to_array();
         frame.set_high_sun(params);
-        frame.droplet = droplet(f64::from(params.light.droplet_diameter)).map(|v| v as f32);
+        frame.sky.droplet = droplet(f64::from(params.light.droplet_diameter)).map(|v| v as f32);
         frame.set_sky_scale(params);
-        frame.sun_bounds = frame.disc_bounds(camera, sun_direction(params), SUN_RADIUS);
+        frame.view.sun_bounds = frame.disc_bounds(camera, sun_direction(params), SUN_RADIUS);
         frame.set_moon(camera, params);
         frame.set_samples(params);
         frame
@@ -444,22 +218,22 @@ impl Frame {
 
     /// Angle between marched pixels in the middle of the picture, radians.
     pub fn marched_angle(&self) -> f32 {
-        self.pixel_angle() * self.stride as f32
+        self.pixel_angle() * self.dispatch.stride as f32
     }
 
     /// Width of a pixel there, radians (`pixel_width` of camera.wgsl).
     fn pixel_angle(&self) -> f32 {
-        match self.camera_kind {
-            kind if kind == Projection::Equirect as u32 => (2.0 * PI / self.width as f32).max(PI / self.height as f32),
-            kind if kind == Projection::Fisheye as u32 => 2.0 * self.half_fov / self.width.min(self.height) as f32,
-            _ => 2.0 * self.tan_half_fov / self.height as f32,
+        match self.projection {
+            Projection::Equirect => (2.0 * PI / self.view.width as f32).max(PI / self.view.height as f32),
+            Projection::Fisheye => 2.0 * self.view.half_fov / self.view.width.min(self.view.height) as f32,
+            Projection::Perspective => 2.0 * self.view.tan_half_fov / self.view.height as f32,
         }
     }
 
     /// Left, top, right and bottom of a part of the picture that holds a disc in a direction, of a radius in radians; empty where
     /// it is not in the picture.
     fn disc_bounds(&self, camera: &Camera, direction: DVec3, radius: f64) -> [f32; 4] {
-        let (width, height) = (f64::from(self.width), f64::from(self.height));
+        let (width, height) = (f64::from(self.view.width), f64::from(self.view.height));
         let [x, y, z] = [camera.right, camera.up, camera.forward].map(|axis| direction.dot(axis));
         // With room for what f32 makes of it.
         let radius = 1.02 * radius;
@@ -495,7 +269,7 @@ impl Frame {
                     let angle = side.atan2(z);
                     if angle.abs() - turn < FRAC_PI_2 { [place(angle - turn), place(angle + turn)] } else { [0.0, 0.0] }
                 };
-                let tan = f64::from(self.tan_half_fov);
+                let tan = f64::from(self.view.tan_half_fov);
                 (along(x, tan * width / height, width), along(-y, tan, height))
             }
         };
@@ -517,31 +291,31 @@ impl Frame {
         let sun = params.lights_moon.map_or_else(|| sun_direction(params), DVec3::from_array);
         let beside = sun - sun.dot(toward) * toward;
         let bright = if beside.length() > 1e-9 { beside.normalize() } else { toward.any_orthonormal_vector() };
-        self.moon_bounds = self.disc_bounds(camera, toward, MOON_RADIUS);
-        self.moon_direction = toward.as_vec3().to_array();
-        self.moon_light = params.moon.light();
-        self.moon_bright = bright.as_vec3().to_array();
-        self.moon_phase = params.moon.phase_angle().cos() as f32;
+        self.view.moon_bounds = self.disc_bounds(camera, toward, MOON_RADIUS);
+        self.sky.moon_direction = toward.as_vec3().to_array();
+        self.sky.moon_light = params.moon.light();
+        self.sky.moon_bright = bright.as_vec3().to_array();
+        self.sky.moon_phase = params.moon.phase_angle().cos() as f32;
     }
 
     /// Height over the level at the eye, degrees.
     pub(crate) fn height_of(&self, direction: DVec3) -> f64 {
-        Vec3::from_array(self.zenith).as_dvec3().dot(direction).clamp(-1.0, 1.0).asin().to_degrees()
+        Vec3::from_array(self.view.zenith).as_dvec3().dot(direction).clamp(-1.0, 1.0).asin().to_degrees()
     }
 
     /// The pixels of the sheet that discs of light are drawn in: first column, first row, columns, rows.
     pub(crate) fn disc_pixels(&self, params: &Params) -> Vec<[u32; 4]> {
         let mut found = Vec::new();
         let shown = params.sun.visible && params.sun.irradiance != [0.0; 3];
-        let sun = Some(self.sun_bounds).filter(|_| shown);
-        for [left, top, right, bottom] in sun.into_iter().chain([self.moon_bounds]) {
-            let first_row = (top.floor() as u32).max(self.sheet_row);
-            let end_row = (bottom.ceil() as u32).min(self.sheet_row + self.rows);
+        let sun = Some(self.view.sun_bounds).filter(|_| shown);
+        for [left, top, right, bottom] in sun.into_iter().chain([self.view.moon_bounds]) {
+            let first_row = (top.floor() as u32).max(self.dispatch.sheet_row);
+            let end_row = (bottom.ceil() as u32).min(self.dispatch.sheet_row + self.dispatch.rows);
             if !(left < right && top < bottom) || first_row >= end_row {
                 continue;
             }
-            let columns = (right.ceil() - left.floor()).min(self.width as f32) as u32;
-            let first_column = (left.floor() as i64).rem_euclid(i64::from(self.width)) as u32;
+            let columns = (right.ceil() - left.floor()).min(self.view.width as f32) as u32;
+            let first_column = (left.floor() as i64).rem_euclid(i64::from(self.view.width)) as u32;
             found.push([first_column, first_row, columns, end_row - first_row]);
         }
         found
@@ -550,30 +324,32 @@ impl Frame {
     /// How finely wide pixels look at what is narrower than they are.
     fn set_samples(&mut self, params: &Params) {
         let pixel = self.pixel_angle();
-        self.sky_samples = (pixel / GLOW).ceil().clamp(1.0, MOST_SKY) as u32;
+        self.view.sky_samples = (pixel / GLOW).ceil().clamp(1.0, MOST_SKY) as u32;
         let narrow = phase_width(params);
         let samples = if pixel > 0.4 * narrow { (pixel / (0.2 * narrow)).ceil() } else { 1.0 };
-        self.phase_samples = samples.clamp(1.0, MOST_PHASE) as u32;
+        self.view.phase_samples = samples.clamp(1.0, MOST_PHASE) as u32;
     }
 
     /// Whether pixels that look down on the clouds may be wider than those are (subrays.wgsl).
     pub fn has_subrays(&self) -> bool {
         // The farthest of them that the eye can see.
-        let away = self.power_top.max(0.0).sqrt();
-        let pixel = Self { stride: refine::spacing(self.sparse > 0), ..self.clone() }.marched_angle();
-        self.altitude > self.shell_top && away * pixel > CLOUD_WIDTH * self.leap_scale
+        let away = self.view.power_top.max(0.0).sqrt();
+        let pixel = self.pixel_angle() * refine::spacing(self.sparse) as f32;
+        self.view.altitude > self.sky.shell_top && away * pixel > CLOUD_WIDTH * self.sky.leap_scale
     }
 
     /// How many pixels of the whole picture the clouds are known at, across and down (lattice.wgsl).
     pub fn known(&self) -> [u32; 2] {
-        refine::known([self.width, self.height], self.sparse > 0)
+        refine::known([self.view.width, self.view.height], self.sparse)
     }
 
     /// The same for the march of a sheet: of all its pixels, or of those that its clouds are known at.
     pub fn of_known(&self) -> Self {
-        let [march_width, sheet_rows] = refine::known([self.width, self.sheet_rows], self.sparse > 0);
-        let stride = refine::spacing(self.sparse > 0);
-        Self { stride, march_width, sheet_row: self.sheet_row / stride, sheet_rows, ..self.clone() }
+        let [march_width, sheet_rows] = refine::known([self.view.width, self.dispatch.sheet_rows], self.sparse);
+        let stride = refine::spacing(self.sparse);
+        let sheet_row = self.dispatch.sheet_row / stride;
+        let dispatch = Dispatch { stride, march_width, sheet_row, sheet_rows, ..self.dispatch.clone() };
+        Self { dispatch, ..self.clone() }
     }
 
     /// Whether the sun can reach the clouds: false only where `sky_light` is none (passes/sky.wgsl, atmosphere.wgsl).
@@ -585,7 +361,7 @@ impl Frame {
         let height = f64::from(0.5 * (params.clouds.base + params.clouds.top));
         let radius = f64::from(params.atmosphere.planet_radius);
         let horizon = -(1.0 - (radius / (radius + height)).powi(2)).max(0.0).sqrt();
-        let cosine = Vec3::from_array(self.zenith).dot(Vec3::from_array(self.sun_direction));
+        let cosine = Vec3::from_array(self.view.zenith).dot(Vec3::from_array(self.sky.sun_direction));
         // The sun's half degree, and what f32 may be off.
         f64::from(cosine) - horizon > -0.005 - 1e-5 && params.sun.irradiance != [0.0; 3]
     }
@@ -595,10 +371,10 @@ impl Frame {
         let clouds = params.has_clouds() || params.has_high_clouds();
         let air = &params.atmosphere;
         // As far around the planet as the horizon is, the sun stands higher by as much.
-        let sine = f64::from(Vec3::from_array(self.zenith).dot(Vec3::from_array(self.sun_direction)));
-        let up = sine.clamp(-1.0, 1.0).asin() > -f64::from(self.horizon_dip) - HALF_SUN;
+        let sine = f64::from(Vec3::from_array(self.view.zenith).dot(Vec3::from_array(self.sky.sun_direction)));
+        let up = sine.clamp(-1.0, 1.0).asin() > -f64::from(self.view.horizon_dip) - HALF_SUN;
         let lit = up && params.sun.irradiance != [0.0; 3] && air.ground_albedo != [0.0; 3];
-        air.ground_shadows && clouds && lit && self.sees_below(camera, self.horizon_dip.into())
+        air.ground_shadows && clouds && lit && self.sees_below(camera, self.view.horizon_dip.into())
     }
 
     /// Whether clouds cast shadows on the air that `camera` sees.
@@ -606,25 +382,25 @@ impl Frame {
         let air = &params.atmosphere;
         let top = highest(params);
         let radius = f64::from(air.planet_radius);
-        let dip = ((radius + top) / (radius + f64::from(self.altitude)).max(1.0)).min(1.0).acos();
-        let inside = f64::from(self.altitude) <= top;
+        let dip = ((radius + top) / (radius + f64::from(self.view.altitude)).max(1.0)).min(1.0).acos();
+        let inside = f64::from(self.view.altitude) <= top;
         let lit = self.sun_above(params, top);
         air.beams && air.enabled && params.has_clouds() && lit && (inside || self.sees_below(camera, dip))
     }
 
     /// Whether any ray of a picture goes below a horizon at an angle under the level, or within half a degree of it.
     fn sees_below(&self, camera: &Camera, dip: f64) -> bool {
-        let down = -Vec3::from_array(self.zenith).as_dvec3();
+        let down = -Vec3::from_array(self.view.zenith).as_dvec3();
         let horizon = FRAC_PI_2 - dip + 0.01;
         let below = |ray: DVec3| ray.normalize().dot(down).clamp(-1.0, 1.0).acos() < horizon;
         let half = match camera.projection {
             Projection::Equirect => return true,
             Projection::Fisheye => {
-                return camera.forward.dot(down).clamp(-1.0, 1.0).acos() - f64::from(self.half_fov) < horizon;
+                return camera.forward.dot(down).clamp(-1.0, 1.0).acos() - f64::from(self.view.half_fov) < horizon;
             }
-            Projection::Perspective => f64::from(self.tan_half_fov),
+            Projection::Perspective => f64::from(self.view.tan_half_fov),
         };
-        let wide = half * f64::from(self.width) / f64::from(self.height);
+        let wide = half * f64::from(self.view.width) / f64::from(self.view.height);
         let ray = |x: f64, y: f64| camera.forward + x * wide * camera.right + y * half * camera.up;
         let steps = || (0..=32).map(|i| f64::from(i) / 16.0 - 1.0);
         // Straight down is in the picture, or the lowest ray is on its rim.
@@ -637,13 +413,13 @@ impl Frame {
     /// What the sun asks of the high clouds.
     fn set_high_sun(&mut self, params: &Params) {
         let up = self.sun_above(params, f64::from(params.high_clouds.altitude));
-        self.high_emboss = u32::from(up && params.high_clouds.emboss > 0.0);
-        self.high_low_sun = u32::from(self.sun_sine() < HIGH_LOW_SUN);
+        self.high_emboss = up && params.high_clouds.emboss > 0.0;
+        self.high_low_sun = self.sun_sine() < HIGH_LOW_SUN;
     }
 
     /// Sine of the sun's height at the eye.
     fn sun_sine(&self) -> f64 {
-        f64::from(Vec3::from_array(self.zenith).dot(Vec3::from_array(self.sun_direction))).clamp(-1.0, 1.0)
+        f64::from(Vec3::from_array(self.view.zenith).dot(Vec3::from_array(self.sky.sun_direction))).clamp(-1.0, 1.0)
     }
 
     /// Whether the sun reaches any cloud in sight up to an altitude.
@@ -652,28 +428,28 @@ impl Frame {
         let dip = |altitude: f64| (radius / (radius + altitude.max(0.0))).acos();
         // The farthest of them in sight is as far around the planet as the horizons of the eye and of the layer lie apart,
         // and sees the sun until it is under a horizon of its own.
-        let lowest = -(dip(f64::from(self.altitude)) + 2.0 * dip(altitude) + HALF_SUN);
+        let lowest = -(dip(f64::from(self.view.altitude)) + 2.0 * dip(altitude) + HALF_SUN);
         self.sun_sine().asin() > lowest && params.sun.irradiance != [0.0; 3]
     }
 
     /// What the sky map is multiplied by: the deeper the sun under the horizon, the more, as dusk loses a factor of two or
     /// more with every degree, to the 18th and, as then the night is what is seen, beyond.
     fn set_sky_scale(&mut self, params: &Params) {
-        let depth = -self.sun_sine().asin().to_degrees() - f64::from(self.horizon_dip).to_degrees();
-        self.sky_scale = (1024.0 * (0.75 * depth.clamp(0.0, 40.0)).exp2()) as f32;
+        let depth = -self.sun_sine().asin().to_degrees() - f64::from(self.view.horizon_dip).to_degrees();
+        self.sky.sky_scale = (1024.0 * (0.75 * depth.clamp(0.0, 40.0)).exp2()) as f32;
         // Where the night outshines all that the sun may give, it is 1000 in the map.
-        let unit = |sun: f32, night: f32| sun.max(1e-3 * self.sky_scale * night).max(1e-30);
-        self.sky_unit = std::array::from_fn(|i| unit(params.sun.irradiance[i], params.atmosphere.night[i]));
+        let unit = |sun: f32, night: f32| sun.max(1e-3 * self.sky.sky_scale * night).max(1e-30);
+        self.sky.sky_unit = std::array::from_fn(|i| unit(params.sun.irradiance[i], params.atmosphere.night[i]));
     }
 
     fn set_camera(&mut self, camera: &Camera) {
-        self.camera_kind = camera.projection as u32;
+        self.projection = camera.projection;
         let half = (0.5 * camera.fov).to_radians();
-        self.tan_half_fov = if camera.projection == Projection::Perspective { half.tan() as f32 } else { 1.0 };
-        self.half_fov = half as f32;
-        self.right = camera.right.as_vec3().to_array();
-        self.up = camera.up.as_vec3().to_array();
-        self.forward = camera.forward.as_vec3().to_array();
+        self.view.tan_half_fov = if camera.projection == Projection::Perspective { half.tan() as f32 } else { 1.0 };
+        self.view.half_fov = half as f32;
+        self.view.right = camera.right.as_vec3().to_array();
+        self.view.up = camera.up.as_vec3().to_array();
+        self.view.forward = camera.forward.as_vec3().to_array();
     }
 
     /// Puts the planet under an eye.
@@ -683,50 +459,52 @@ impl Frame {
         let distance = from_centre.length();
         let h = distance - radius;
         let power = |altitude: f64| ((h - altitude) * (2.0 * radius + h + altitude)) as f32;
-        self.zenith = if distance > 0.0 { (from_centre / distance).as_vec3().to_array() } else { [0.0, 0.0, 1.0] };
-        self.altitude = h as f32;
-        self.centre_distance = distance as f32;
+        self.view.zenith = if distance > 0.0 { (from_centre / distance).as_vec3().to_array() } else { [0.0, 0.0, 1.0] };
+        self.view.altitude = h as f32;
+        self.view.centre_distance = distance as f32;
         let reach = chart_reach(eye, radius);
-        self.chart_reach = reach as f32;
-        self.chart_slope = (eye.truncate() / reach).as_vec2().to_array();
-        self.horizon_dip = (radius / (radius + h.max(0.0))).acos() as f32;
+        self.view.chart_reach = reach as f32;
+        self.view.chart_slope = (eye.truncate() / reach).as_vec2().to_array();
+        self.view.horizon_dip = (radius / (radius + h.max(0.0))).acos() as f32;
         // An eye under the ground is on it: were the ground to hide nothing from there, it would vanish at z = 0.
-        self.power_ground = power(0.0).max(0.0);
-        [self.shell_base, self.shell_top] = params.shell();
-        self.lower_top = params.lower_top();
-        self.upper_shown = params.upper_shown();
-        self.rain_reach = params.rain_reach();
-        self.power_base = power(f64::from(self.shell_base));
-        self.power_top = power(f64::from(self.shell_top));
+        self.view.power_ground = power(0.0).max(0.0);
+        [self.sky.shell_base, self.sky.shell_top] = params.shell();
+        self.sky.lower_top = params.lower_top();
+        self.sky.upper_shown = params.upper_shown();
+        self.sky.rain_reach = params.rain_reach();
+        self.view.power_base = power(f64::from(self.sky.shell_base));
+        self.view.power_top = power(f64::from(self.sky.shell_top));
         // The air that they shade: from where the eye is nearest to it to where the last of it goes under the horizon.
         let top = highest(params);
-        self.power_shade = power(top);
+        self.view.power_shade = power(top);
         let tangent = |altitude: f64| (altitude.max(0.0) * (2.0 * radius + altitude)).sqrt();
-        self.beam_start = (h - top).max(0.0) as f32;
-        self.beam_length = (tangent(h) + tangent(top) - f64::from(self.beam_start)).max(1.0) as f32;
-        self.power_high = power(f64::from(params.high_clouds.altitude));
-        self.power_air = power(AIR_TOP);
+        self.view.beam_start = (h - top).max(0.0) as f32;
+        self.view.beam_length = (tangent(h) + tangent(top) - f64::from(self.view.beam_start)).max(1.0) as f32;
+        self.view.power_high = power(f64::from(params.high_clouds.altitude));
+        self.view.power_air = power(AIR_TOP);
     }
 
     fn set_volume(&mut self, eye: DVec3, params: &Params) {
         let Some(volume) = &params.volume else {
             let upper = if params.has_upper_clouds() { params.upper_clouds.extinction } else { 0.0 };
             let rain = if params.has_rain_shafts() { params.clouds.rain_extinction } else { 0.0 };
-            self.extinction = params.clouds.extinction.max(upper).max(rain);
+            self.sky.extinction = params.clouds.extinction.max(upper).max(rain);
             // No share of what is there is 0: that it is thin does not change where it is marched.
             const LEAST: f32 = 1e-20;
-            let share =
-                |extinction| if self.extinction > 0.0 { f32::max(extinction / self.extinction, LEAST) } else { 0.0 };
-            [self.share, self.upper_share, self.rain_share] = [params.clouds.extinction, upper, rain].map(share);
+            let share = |extinction| {
+                if self.sky.extinction > 0.0 { f32::max(extinction / self.sky.extinction, LEAST) } else { 0.0 }
+            };
+            [self.sky.share, self.sky.upper_share, self.sky.rain_share] =
+                [params.clouds.extinction, upper, rain].map(share);
             return;
         };
         let [low, high] = volume.bounds();
         let voxels = DVec3::from_array(volume.size().map(|n| n as f64));
-        self.extinction = volume.max();
-        self.volume_low = (low - eye).as_vec3().to_array();
-        self.volume_high = (high - eye).as_vec3().to_array();
-        self.volume_scale = (voxels / (high - low)).as_vec3().to_array();
-        self.voxel = ((high - low) / voxels).min_element() as f32;
+        self.sky.extinction = volume.max();
+        self.sky.volume_low = (low - eye).as_vec3().to_array();
+        self.sky.volume_high = (high - eye).as_vec3().to_array();
+        self.sky.volume_scale = (voxels / (high - low)).as_vec3().to_array();
+        self.sky.voxel = ((high - low) / voxels).min_element() as f32;
     }
 
     /// The noises and the weather of the upper deck, which are scaled with it.
@@ -739,15 +517,15 @@ impl Frame {
             let [x, y] = plane(at, tile);
             [x, y, wrap(-carried.rise / scale, tile)]
         };
-        self.upper_direction = compass(f64::from(upper.direction)).as_vec2().to_array();
-        self.upper_shape_origin = volume(shape, clouds.shape_scale);
-        self.upper_detail_origin = volume(detail, clouds.detail_scale);
-        self.upper_curl_origin = plane(detail, clouds.curl_scale);
+        self.sky.upper_direction = compass(f64::from(upper.direction)).as_vec2().to_array();
+        self.sky.upper_shape_origin = volume(shape, clouds.shape_scale);
+        self.sky.upper_detail_origin = volume(detail, clouds.detail_scale);
+        self.sky.upper_curl_origin = plane(detail, clouds.curl_scale);
         // Another part of the map, or one deck would stand on the other.
         let extent = f64::from(params.weather.extent);
         let weather = shape + DVec2::new(0.37, 0.61) * extent * scale;
         let (extent, edge) = (params.weather.extent, params.weather.edge);
-        self.upper_weather_origin = [weather.x, -weather.y].map(|v| on_map(v / scale, extent, edge));
+        self.sky.upper_weather_origin = [weather.x, -weather.y].map(|v| on_map(v / scale, extent, edge));
     }
 
     fn set_wind(&mut self, eye: DVec3, params: &Params, time: f64) {
@@ -755,41 +533,41 @@ impl Frame {
         let carried = Carried::at(params, time);
         let volume = |at: DVec2, scale: f32| [wrap(at.x, scale), wrap(at.y, scale), wrap(-carried.rise, scale)];
         let plane = |at: DVec2, scale: f32| [wrap(at.x, scale), wrap(at.y, scale)];
-        self.wind_direction = compass(f64::from(wind.direction)).as_vec2().to_array();
+        self.sky.wind_direction = compass(f64::from(wind.direction)).as_vec2().to_array();
         let eye = on_chart(eye, params);
         let (shape, detail) = (eye - carried.shape, eye - carried.detail);
-        self.shape_origin = volume(shape, clouds.shape_scale);
-        self.detail_origin = volume(detail, clouds.detail_scale);
-        self.curl_origin = plane(detail, clouds.curl_scale);
+        self.sky.shape_origin = volume(shape, clouds.shape_scale);
+        self.sky.detail_origin = volume(detail, clouds.detail_scale);
+        self.sky.curl_origin = plane(detail, clouds.curl_scale);
 
         // The middle of the weather map is the origin of the world, its first row the north.
         let weather = eye - carried.weather;
         let half = 0.5 * f64::from(params.weather.extent);
         let (extent, edge) = (params.weather.extent, params.weather.edge);
-        self.weather_origin = [on_map(weather.x + half, extent, edge), on_map(half - weather.y, extent, edge)];
+        self.sky.weather_origin = [on_map(weather.x + half, extent, edge), on_map(half - weather.y, extent, edge)];
 
         let broad = f64::from(params.weather.broad_extent) * 0.5;
-        self.broad_origin = plane(DVec2::new(weather.x + broad, broad - weather.y), params.weather.broad_extent);
+        self.sky.broad_origin = plane(DVec2::new(weather.x + broad, broad - weather.y), params.weather.broad_extent);
         let shares = params.broad_shares();
-        self.broad_most = 0.5 * shares.total;
-        self.broad_scale = shares.total;
-        self.broad_bend = broad_weather::BEND * shares.bend * self.broad_scale;
+        self.sky.broad_most = 0.5 * shares.total;
+        self.sky.broad_scale = shares.total;
+        self.sky.broad_bend = broad_weather::BEND * shares.bend * self.sky.broad_scale;
         let ways = f64::from(broad_weather::BEND * params.weather.extent / params.weather.broad_extent);
-        self.broad_stretch = (ways * broad_weather::STEEPEST) as f32;
+        self.sky.broad_stretch = (ways * broad_weather::STEEPEST) as f32;
         let fallen = RAIN_SPEED * time / RAIN_STRETCH;
-        self.rain_fall = wrap(fallen, clouds.shape_scale) * clouds.shape_scale;
+        self.sky.rain_fall = wrap(fallen, clouds.shape_scale) * clouds.shape_scale;
         self.set_upper_wind(eye, params, &carried);
 
         let (spot, radius) = params.clear_spot();
-        self.clear_at = (DVec2::from_array(spot) - eye).as_vec2().to_array();
-        self.clear_radius = radius as f32;
+        self.sky.clear_at = (DVec2::from_array(spot) - eye).as_vec2().to_array();
+        self.sky.clear_radius = radius as f32;
 
         let along = compass(f64::from(high.direction));
         let across = DVec2::new(-along.y, along.x);
         let at = DVec2::new(eye.dot(along), eye.dot(across)) - carried.high;
-        self.high_origin = plane(at, high.scale);
-        self.high_broad_origin = plane(at, HIGH_BROAD * high.scale);
-        self.high_direction = along.as_vec2().to_array();
+        self.sky.high_origin = plane(at, high.scale);
+        self.sky.high_broad_origin = plane(at, HIGH_BROAD * high.scale);
+        self.sky.high_direction = along.as_vec2().to_array();
         // In steps of a 256th of the smallest octave's life, which change no pixel by more than four thousandths: a new
         // texture in every frame would take longer than all else that is baked.
         let step = 1.0 / (256.0 * f64::from(high.evolution) * f64::from(1u32 << (high.octaves - 1)));
@@ -799,9 +577,9 @@ impl Frame {
             // Update numbers come round after 65,536, exact in f32 (passes/high_clouds.wgsl).
             let (number, age) = (updates.floor().rem_euclid(65536.0) as f32, (updates - updates.floor()) as f32);
             let (numbers, ages) = if octave < 4 {
-                (&mut self.high_update, &mut self.high_age)
+                (&mut self.sky.high_update, &mut self.sky.high_age)
             } else {
-                (&mut self.high_update_small, &mut self.high_age_small)
+                (&mut self.sky.high_update_small, &mut self.sky.high_age_small)
             };
             numbers[octave % 4] = number;
             ages[octave % 4] = age;
@@ -810,13 +588,13 @@ impl Frame {
 
     /// Notes what has changed since the frame before, for reprojection.
     pub(crate) fn set_previous(&mut self, previous: &Self, eye_motion: DVec3, carried: &Carried) {
-        self.previous_right = previous.right;
-        self.previous_up = previous.up;
-        self.previous_forward = previous.forward;
-        self.previous_tan_half_fov = previous.tan_half_fov;
-        self.previous_half_fov = previous.half_fov;
-        self.previous_sun = previous.sun_direction;
-        self.eye_motion = eye_motion.as_vec3().to_array();
-        self.cloud_motion = carried.drift().as_vec3().to_array();
+        self.view.previous_right = previous.view.right;
+        self.view.previous_up = previous.view.up;
+        self.view.previous_forward = previous.view.forward;
+        self.view.previous_tan_half_fov = previous.view.tan_half_fov;
+        self.view.previous_half_fov = previous.view.half_fov;
+        self.sky.previous_sun = previous.sky.sun_direction;
+        self.view.eye_motion = eye_motion.as_vec3().to_array();
+        self.view.cloud_motion = carried.drift().as_vec3().to_array();
     }
 }

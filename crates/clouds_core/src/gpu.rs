@@ -226,7 +226,7 @@ struct Kernels {
 }
 
 /// Most kernels that are kept: on lavapipe one takes 2 to 3 MB, and a picture has ten to thirty.
-const MOST_KERNELS: usize = 96;
+const MOST_KERNELS: usize = 48;
 
 impl Kernels {
     /// Forgets those whose last use is longest ago, where there are too many.

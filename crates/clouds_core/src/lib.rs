@@ -31,6 +31,7 @@ pub mod shader;
 pub mod shot;
 mod specialization;
 mod targets;
+pub mod uniforms;
 pub mod volume;
 pub mod wind;
 

@@ -54,7 +54,7 @@ impl Lights {
     /// Of a sky as it is seen in a frame.
     pub fn new(params: &Params, frame: &Frame) -> Self {
         let strength = |direction: DVec3, light: [f32; 3]| {
-            let under = -frame.height_of(direction) - f64::from(frame.horizon_dip).to_degrees();
+            let under = -frame.height_of(direction) - f64::from(frame.view.horizon_dip).to_degrees();
             f64::from(light.into_iter().fold(0.0, f32::max)) * (-DUSK * under.max(0.0)).exp2()
         };
         let night = if params.atmosphere.enabled { params.atmosphere.night } else { [0.0; 3] };

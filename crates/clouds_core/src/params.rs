@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use crate::error::{Error, Result};
 use crate::schema::{self, Block, Map, Table, Typed as _};
+use crate::uniforms;
 use crate::volume::DensityGrid;
 use crate::{choice, params};
 
@@ -919,12 +920,12 @@ pub fn block(type_name: &str) -> Option<Box<dyn Block>> {
     blocks.into_iter().find(|block| block.type_name() == type_name)
 }
 
-/// Where each block starts in the `params` uniform, and the size of the whole, in bytes.
+/// Where each block starts in the `params` uniform, the last of them `quality`, and the size of the whole, in bytes.
 pub fn uniform_layout() -> (Vec<(&'static str, &'static str, usize)>, usize) {
-    let params = Params::default();
+    let (params, quality) = (Params::default(), Quality::default());
     let mut offset = 0;
     let mut blocks = Vec::new();
-    for (name, block) in params.blocks() {
+    for (name, block) in params.blocks().into_iter().chain([("quality", &quality as &dyn Block)]) {
         let size = schema::size(block.fields());
         if size > 0 {
             blocks.push((name, block.type_name(), offset));
@@ -935,17 +936,12 @@ pub fn uniform_layout() -> (Vec<(&'static str, &'static str, usize)>, usize) {
 }
 
 /// The words of the `params` uniform.
-pub fn uniform(params: &Params) -> Vec<u32> {
+pub fn uniform(params: &Params, quality: &Quality) -> Vec<u32> {
     // Shaders see by the cover whether there are high clouds.
     let mut params = Cow::Borrowed(params);
     if !params.has_high_clouds() {
         params.to_mut().high_clouds.coverage = 0.0;
     }
-    let mut words = Vec::new();
-    for (_, block) in params.blocks() {
-        let start = words.len();
-        words.resize(start + schema::size(block.fields()) / 4, 0);
-        block.write(&mut words[start..]);
-    }
-    words
+    let blocks = params.blocks().into_iter().map(|(_, block)| block);
+    uniforms::words(&blocks.chain([quality as &dyn Block]).collect::<Vec<_>>())
 }

@@ -57,15 +57,15 @@ impl Plan {
     pub fn new(frame: &mut Frame, params: &Params, quality: &Quality, whole: bool, layers: bool) -> Self {
         let integrator = Integrator::new(params, quality);
         let march = integrator == Integrator::March;
-        frame.cloudless = u32::from(integrator.is_cloudless(params));
-        frame.sparse = u32::from(march && refine::is_sparse(frame, quality));
+        frame.cloudless = integrator.is_cloudless(params);
+        frame.sparse = march && refine::is_sparse(frame, quality);
         let rows = match integrator {
-            _ if whole => frame.height,
-            Integrator::March => (STRIP_PIXELS / frame.width).next_multiple_of(COARSEST),
-            Integrator::Reference | Integrator::Path => STRIP_RAYS / frame.width,
+            _ if whole => frame.view.height,
+            Integrator::March => (STRIP_PIXELS / frame.view.width).next_multiple_of(COARSEST),
+            Integrator::Reference | Integrator::Path => STRIP_RAYS / frame.view.width,
         };
-        let rows = rows.clamp(1, frame.height);
-        let strips = (0..frame.height).step_by(rows as usize).map(|row| row..(row + rows).min(frame.height));
+        let rows = rows.clamp(1, frame.view.height);
+        let strips = (0..frame.view.height).step_by(rows as usize).map(|row| row..(row + rows).min(frame.view.height));
         Self {
             integrator,
             by_cells: march && composite::by_cells(frame, quality),
@@ -77,10 +77,10 @@ impl Plan {
     /// Sets the rows of a strip. Lattices of rays meet in the first row of the next one.
     pub fn set_strip(&self, frame: &mut Frame, quality: &Quality, strip: &Range<u32>) {
         let lattice = self.integrator == Integrator::March && refine::is_needed(frame, quality);
-        let shared = u32::from(lattice && strip.end < frame.height);
-        frame.sheet_row = strip.start;
-        frame.rows = strip.len() as u32;
-        frame.sheet_rows = frame.rows + shared;
+        let shared = u32::from(lattice && strip.end < frame.view.height);
+        frame.dispatch.sheet_row = strip.start;
+        frame.dispatch.rows = strip.len() as u32;
+        frame.dispatch.sheet_rows = frame.dispatch.rows + shared;
     }
 
     /// Most rows that the buffers of a strip hold.

@@ -6,22 +6,23 @@
 
 use std::collections::HashMap;
 use std::mem;
+use std::num::NonZero;
 use std::ops::Range;
 use std::panic::resume_unwind;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::Instant;
 
 use crate::error::Result;
-use crate::gpu::{COPIED, Download, Gpu, Interrupt, Timings, mips, texture_bytes};
+use crate::gpu::{COPIED, Download, Gpu, Interrupt, Timings, lock, mips, texture_bytes};
 use crate::kernel::{Binding, Bindings, Kernel, Name, Resources, Specialization};
 
 /// Longest that one submission usually keeps the device busy, s, and that one dispatch does whose list is as long as it can be: a
 /// fourth of the two seconds after which Windows resets a device. After Ctrl-C two of them go on.
 const SLICE_SECONDS: f64 = 0.5;
 /// The uniform block that differs from slice to slice.
-const PER_DISPATCH: &str = "frame";
+const PER_DISPATCH: &str = "dispatch";
 /// Most workgroups along one side of a dispatch (WebGPU's default limit).
 const MOST_GROUPS: u32 = 65_535;
 /// What uniform blocks are aligned to, bytes (WebGPU's default limit).
@@ -323,11 +324,19 @@ fn compiling<T>(gpu: &Gpu, wanted: impl Iterator<Item = Wanted>, work: impl FnOn
             missing.push((name, specialization));
         }
     }
+    // No more threads than run at once: each keeps memory of its own for what it has compiled (glibc's arenas), 669 MB for 60
+    // random skies with a thread for each kernel and 350 MB with one arena.
+    let threads = thread::available_parallelism().map_or(1, NonZero::get).min(missing.len());
+    let missing = Mutex::new(missing.into_iter());
+    let compile = || {
+        let next = || lock(&missing).next();
+        while let Some((name, specialization)) = next() {
+            gpu.kernel(name, &specialization)?;
+        }
+        Ok(())
+    };
     thread::scope(|scope| {
-        let threads: Vec<_> = missing
-            .into_iter()
-            .map(|(name, specialization)| scope.spawn(move || gpu.kernel(name, &specialization).map(drop)))
-            .collect();
+        let threads: Vec<_> = (0..threads).map(|_| scope.spawn(compile)).collect();
         let done = work()?;
         for thread in threads {
             thread.join().unwrap_or_else(|panic| resume_unwind(panic))?;

@@ -140,14 +140,14 @@ impl Renderer {
         interrupt: Interrupt<'_>,
     ) -> Result<Picture> {
         let (mut frame, params) = shot.checked(self.size, &self.quality)?;
-        frame.first_sample = first_sample;
-        frame.ground_shadow = u32::from((shot.background || layers) && frame.has_ground_shadow(shot.camera, &params));
+        frame.view.first_sample = first_sample;
+        frame.ground_shadow = (shot.background || layers) && frame.has_ground_shadow(shot.camera, &params);
         let plan = Plan::new(&mut frame, &params, &self.quality, false, layers);
         self.timings = Timings::default();
         let mut rec = Recorder::new(&self.gpu, &mut self.timings, interrupt);
         let inputs = Inputs::new(shot, &params, &self.quality, &frame, &plan);
         self.luts.update(&mut rec, &inputs)?;
-        let scene = fit_scene(&mut self.scene_depth, &self.gpu, shot.scene, frame.width * plan.most_rows());
+        let scene = fit_scene(&mut self.scene_depth, &self.gpu, shot.scene, frame.view.width * plan.most_rows());
         rec.bind(scene.map_or(Vec::new(), SceneTextures::bindings));
         self.lut_memory = held(&rec);
 
@@ -157,13 +157,14 @@ impl Renderer {
             let targets = StillTargets::fit(&mut self.still, &self.gpu, &frame, plan.integrator);
             let StillTargets { refined, marched, composed, backdrop, rays, .. } = targets;
             if let (Some(textures), Some(given)) = (scene, &shot.scene) {
-                let [first, pixels] = [strip.start, frame.sheet_rows].map(|rows| rows as usize * frame.width as usize);
+                let [first, pixels] =
+                    [strip.start, frame.dispatch.sheet_rows].map(|rows| rows as usize * frame.view.width as usize);
                 textures.upload(&self.gpu, given, first..first + pixels);
             }
             match (plan.integrator, rays) {
                 (Integrator::Reference, Some(rays)) => reference::run(&mut rec, &frame, rays, marched)?,
                 (Integrator::Path, Some(rays)) => path::run(&mut rec, &frame, rays, marched)?,
-                _ if frame.cloudless > 0 => rec.clear(&marched.samples),
+                _ if frame.cloudless => rec.clear(&marched.samples),
                 _ => march::record(&mut rec, &frame.of_known(), &self.quality, refined, marched),
             }
             let parts = Parts { marched, backdrop, refined, out: composed };
@@ -194,22 +195,22 @@ impl Renderer {
         }
         let (mut frame, params) = shot.checked(self.size, &self.quality)?;
         self.check_pixels(shot)?;
-        frame.ground_shadow = u32::from(shot.background && frame.has_ground_shadow(shot.camera, &params));
+        frame.ground_shadow = shot.background && frame.has_ground_shadow(shot.camera, &params);
         // Taken out while the frame is in the making: if it fails, the next one starts anew.
         let last = self.last.take().filter(|last| !last.is_cut(&shot.of(&params)));
-        let cloudless = u32::from(integrator.is_cloudless(&params));
+        let cloudless = integrator.is_cloudless(&params);
         let last = last.filter(|last| {
-            let same_size = [last.frame.width, last.frame.height] == self.size;
+            let same_size = [last.frame.view.width, last.frame.view.height] == self.size;
             last.frame.cloudless == cloudless && (last.is_bare(shot.scene.is_some()) || same_size)
         });
-        frame.scene = u32::from(shot.scene.is_some() || last.as_ref().is_some_and(|last| last.scene.is_some()));
+        frame.scene = shot.scene.is_some() || last.as_ref().is_some_and(|last| last.scene.is_some());
         let plan = Plan::new(&mut frame, &params, &self.quality, true, false);
         let last = last.filter(|last| last.is_bare(shot.scene.is_some()) || last.frame.sparse == frame.sparse);
         let (targets, resized) = fit_temporal(&mut self.temporal, &self.gpu, &frame);
         let resized = resized.filter(|_| last.is_some());
         upload_scenes(&mut self.scene_depth, targets, &self.gpu, shot.scene, last.as_ref(), &frame);
         frame.follow(shot, &params, last.as_ref(), resized.as_ref());
-        frame.sheet_rows = frame.height;
+        frame.dispatch.sheet_rows = frame.view.height;
 
         self.timings = Timings::default();
         let mut rec = Recorder::new(&self.gpu, &mut self.timings, interrupt);
@@ -225,7 +226,7 @@ impl Renderer {
         let index = last.as_ref().map_or(0, |last| last.index + 1);
         let buffers = reproject::Buffers { refined, current, before, scene_before, now };
         let follow = |rec: &mut Recorder<'_>| reproject::record(rec, &frame, &self.quality, index, &buffers);
-        if frame.cloudless > 0 {
+        if frame.cloudless {
         } else if last.is_some() {
             follow(&mut rec);
         } else {
@@ -280,7 +281,7 @@ impl Renderer {
     /// where frames converge or are traced.
     pub fn history_length(&mut self) -> Result<Vec<u32>> {
         check_fork()?;
-        let followed = self.last.as_ref().is_some_and(|last| last.frame.cloudless == 0);
+        let followed = self.last.as_ref().is_some_and(|last| !last.frame.cloudless);
         let Some(targets) = self.temporal.as_ref().filter(|targets| followed && targets.size == self.size) else {
             return Ok(Vec::new());
         };
@@ -330,7 +331,7 @@ fn fit_temporal<'a>(
     gpu: &Gpu,
     frame: &Frame,
 ) -> (&'a mut TemporalTargets, Option<TemporalTargets>) {
-    let (size, sparse) = ([frame.width, frame.height], frame.sparse > 0);
+    let (size, sparse) = ([frame.view.width, frame.view.height], frame.sparse);
     let old = kept.take_if(|old| (old.size, old.sparse) != (size, sparse));
     (kept.get_or_insert_with(|| TemporalTargets::new(gpu, size, sparse)), old)
 }
@@ -345,10 +346,10 @@ fn upload_scenes(
     last: Option<&Past>,
     frame: &Frame,
 ) {
-    if frame.scene == 0 {
+    if !frame.scene {
         return;
     }
-    let pixels = frame.width * frame.height;
+    let pixels = frame.view.width * frame.view.height;
     let nothing = vec![f32::INFINITY; pixels as usize];
     let now = scene.unwrap_or(SceneDepth { distance: &nothing, color: None });
     let before = last.and_then(|last| last.scene.as_deref()).unwrap_or(&nothing);
@@ -370,12 +371,12 @@ pub(crate) fn held(rec: &Recorder<'_>) -> Vec<(&'static str, u64)> {
 /// Brings a strip of a still back.
 fn download(rec: &mut Recorder<'_>, frame: &Frame, targets: &StillTargets, layers: bool) {
     let StillTargets { marched, composed, rays, .. } = targets;
-    let pixels = count([frame.width, frame.rows]);
+    let pixels = count([frame.view.width, frame.dispatch.rows]);
     rec.download(&composed.image, 0, 16 * pixels);
     if layers {
         rec.download(&composed.sky, 0, 16 * pixels);
         rec.download(&composed.depth, 0, 4 * pixels);
-        let known = refine::known([frame.width, frame.rows], frame.sparse > 0);
+        let known = refine::known([frame.view.width, frame.dispatch.rows], frame.sparse);
         rec.download(&marched.samples, 0, 4 * count(known));
         if let Some(rays) = rays {
             rec.download(&rays.uncertainty, 0, 16 * pixels);
@@ -393,9 +394,9 @@ impl Picture {
         self.sky.extend_from_slice(downloads[1].numbers());
         self.depth.extend_from_slice(downloads[2].numbers());
         let samples: &[u32] = downloads[3].numbers();
-        if frame.sparse > 0 {
-            let [columns, _] = refine::known([frame.width, frame.rows], true);
-            self.samples.extend(at_known(samples, columns, [frame.width, frame.rows]));
+        if frame.sparse {
+            let [columns, _] = refine::known([frame.view.width, frame.dispatch.rows], true);
+            self.samples.extend(at_known(samples, columns, [frame.view.width, frame.dispatch.rows]));
         } else {
             self.samples.extend_from_slice(samples);
         }
@@ -420,12 +421,12 @@ impl Frame {
         let carried = Carried::between((&last.params, last.time), (params, shot.time));
         self.set_previous(&last.frame, shot.camera.eye - last.camera.eye, &carried);
         let scene = shot.scene.map(|scene| scene.distance);
-        let still = last.camera == *shot.camera && self.cloud_motion == [0.0; 3] && last.scene.as_deref() == scene;
-        self.moving = u32::from(!still);
+        let still = last.camera == *shot.camera && self.view.cloud_motion == [0.0; 3] && last.scene.as_deref() == scene;
+        self.view.moving = u32::from(!still);
         if let Some(old) = resized {
-            [self.previous_width, self.previous_height] = old.size;
-            self.previous_spacing = refine::spacing(old.sparse);
-            self.previous_round = reproject::round(old.sparse);
+            [self.view.previous_width, self.view.previous_height] = old.size;
+            self.view.previous_spacing = refine::spacing(old.sparse);
+            self.view.previous_round = reproject::round(old.sparse);
         }
     }
 }

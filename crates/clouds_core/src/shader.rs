@@ -4,9 +4,9 @@ use std::collections::HashSet;
 use std::fmt::Write as _;
 use std::path::Path;
 
-use crate::frame::Frame;
 use crate::params::{self, Params, Quality};
-use crate::schema::wgsl_struct;
+use crate::schema::{Block, wgsl_struct};
+use crate::uniforms::{Dispatch, Sky, View};
 
 include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
 
@@ -83,12 +83,16 @@ impl Linked {
     }
 }
 
-/// The text of a WGSL file. `params` and `frame` are not files: they are written from the one definition of the
+/// The text of a WGSL file. `params` and `uniforms` are not files: they are written from the one definition of the
 /// parameters, so that they cannot be stale.
 pub fn read(name: &str) -> Option<String> {
     match name {
         "params" => Some(params_source()),
-        "frame" => Some(wgsl_struct(&Frame::default())),
+        "uniforms" => {
+            let parts: [&dyn Block; 3] = [&View::default(), &Sky::default(), &Dispatch::default()];
+            let frame = "struct Frame {\n    @align(16) view: View,\n    @align(16) sky: Sky,\n}\n";
+            Some(parts.map(wgsl_struct).concat() + frame)
+        }
         _ => match std::env::var_os(FOLDER) {
             // For work on shaders: read from a folder, without building anything again.
             Some(folder) => std::fs::read_to_string(Path::new(&folder).join(format!("{name}.wgsl"))).ok(),

@@ -46,11 +46,11 @@ impl<'a> Shot<'a> {
         self.scene.map_or(Ok(()), |scene| scene.check(size))?;
         let params = self.params.at(self.time);
         let mut frame = Frame::new(self.camera, &params, self.time, size);
-        frame.most_rays = quality.most_rays();
-        frame.background = u32::from(self.background);
-        frame.scene = u32::from(self.scene.is_some());
-        frame.scene_lit = u32::from(self.scene.is_some_and(|scene| scene.color.is_some()));
-        frame.beams = u32::from(frame.has_beams(self.camera, &params));
+        frame.view.most_rays = quality.most_rays();
+        frame.view.background = u32::from(self.background);
+        frame.scene = self.scene.is_some();
+        frame.view.scene_lit = u32::from(self.scene.is_some_and(|scene| scene.color.is_some()));
+        frame.beams = frame.has_beams(self.camera, &params);
         Ok((frame, params))
     }
 }

@@ -9,24 +9,24 @@ use crate::passes::reproject;
 
 /// The table of a picture. `layers`: the sky and the depth are asked for too.
 pub(crate) fn of_picture(params: &Params, quality: &Quality, frame: &Frame, layers: bool) -> Arc<Specialization> {
-    let high = frame.high_clouds > 0;
+    let high = frame.high_clouds;
     let on = |on: bool| f64::from(u8::from(on));
     of_sky(params, quality).with(&[
         ("SUNLIT", on(frame.sunlit(params))),
-        ("CAMERA", f64::from(frame.camera_kind)),
-        ("BEAMS", on(frame.beams > 0)),
-        ("SCENE", on(frame.scene > 0)),
+        ("CAMERA", f64::from(frame.projection as u32)),
+        ("BEAMS", on(frame.beams)),
+        ("SCENE", on(frame.scene)),
         ("SUBRAYS", on(params.volume.is_none() && frame.has_subrays())),
-        ("SPARSE", on(frame.sparse > 0)),
-        ("STRIDE", f64::from(reproject::stride(frame.sparse > 0))),
-        ("WIDE_PHASE", on(frame.phase_samples > 1)),
+        ("SPARSE", on(frame.sparse)),
+        ("STRIDE", f64::from(reproject::stride(frame.sparse))),
+        ("WIDE_PHASE", on(frame.view.phase_samples > 1)),
         ("HIGH", on(high)),
-        ("HIGH_EMBOSS", on(high && frame.high_emboss > 0)),
-        ("HIGH_LOW_SUN", on(high && frame.high_low_sun > 0)),
-        ("CLOUDLESS", on(frame.cloudless > 0)),
-        ("GROUND_SHADOW", on(frame.ground_shadow > 0)),
+        ("HIGH_EMBOSS", on(high && frame.high_emboss)),
+        ("HIGH_LOW_SUN", on(high && frame.high_low_sun)),
+        ("CLOUDLESS", on(frame.cloudless)),
+        ("GROUND_SHADOW", on(frame.ground_shadow)),
         ("LAYERS", on(layers)),
-        ("WIDE", on(frame.sky_samples > 1)),
+        ("WIDE", on(frame.view.sky_samples > 1)),
     ])
 }
 

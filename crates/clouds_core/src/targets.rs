@@ -46,7 +46,7 @@ impl StillTargets {
 
     /// Those of a strip: the same as before where it has room in them.
     pub fn fit<'a>(kept: &'a mut Option<Self>, gpu: &Gpu, frame: &Frame, integrator: Integrator) -> &'a Self {
-        let (sparse, [width, rows]) = (frame.sparse > 0, [frame.width, frame.sheet_rows]);
+        let (sparse, [width, rows]) = (frame.sparse, [frame.view.width, frame.dispatch.sheet_rows]);
         let fits = |old: &Self| {
             (old.size[0], old.integrator, old.sparse) == (width, integrator, sparse) && old.size[1] >= rows
         };

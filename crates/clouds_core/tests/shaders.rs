@@ -1,9 +1,9 @@
 //! Every shader links and is valid, and agrees with the parameters; no GPU needed.
 
-use clouds_core::frame::Frame;
 use clouds_core::params::{self, Params, Quality};
 use clouds_core::schema::{Block, size, wgsl_name};
 use clouds_core::shader::{self, Linked};
+use clouds_core::uniforms::{Dispatch, Sky, View};
 use wgpu::naga::{self, TypeInner};
 
 fn linked(name: &str) -> (Linked, naga::Module) {
@@ -58,20 +58,19 @@ fn check_block(module: &naga::Module, block: &dyn Block) {
 #[test]
 fn naga_lays_out_the_uniforms_as_we_do() {
     let (_, module) = linked("bindings");
-    let params = Params::default();
+    let (params, quality) = (Params::default(), Quality::default());
     let (blocks, bytes) = params::uniform_layout();
     let (members, span) = naga_struct(&module, "Params");
     let ours: Vec<_> = blocks.iter().map(|(name, _, offset)| ((*name).to_owned(), *offset as u32)).collect();
     let theirs: Vec<_> = members.into_iter().map(|(name, offset, _)| (name, offset)).collect();
     assert_eq!(theirs, ours);
     assert_eq!(span as usize, bytes);
-    assert_eq!(params::uniform(&params).len() * 4, bytes);
+    assert_eq!(params::uniform(&params, &quality).len() * 4, bytes);
     for (_, block) in params.blocks().into_iter().filter(|(_, block)| size(block.fields()) > 0) {
         check_block(&module, block);
     }
-    let quality = Quality::default();
-    let frame = Frame::default();
-    for block in [&quality as &dyn Block, &frame] {
+    let (view, sky, dispatch) = (View::default(), Sky::default(), Dispatch::default());
+    for block in [&quality as &dyn Block, &view, &sky, &dispatch] {
         check_block(&module, block);
         assert!(naga_struct(&module, block.type_name()).1 as usize <= size(block.fields()));
     }

@@ -20,29 +20,29 @@ fn beams_bake(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let place = vec2f(id.xy) / vec2f(size.xy - 1u);
-    let direction = view_direction(place * vec2f(f32(frame.width), f32(frame.height))).xyz;
+    let direction = view_direction(place * vec2f(f32(frame.view.width), f32(frame.view.height))).xyz;
     let way = air_way(direction);
     // Where the ray is under the highest clouds.
-    let under = hit_sphere(direction, frame.power_shade);
+    let under = hit_sphere(direction, frame.view.power_shade);
     let start = max(under.near, way.start);
     var end = select(0.0, min(under.far, way.start + way.length), under.hit);
     // Rays just below the horizon go on, as if through air, for those just above it that lie between the two.
-    let sunk = -asin(clamp(dot(direction, frame.zenith), -1.0, 1.0)) - frame.horizon_dip;
-    end = select(end, frame.beam_start + frame.beam_length, way.grounded && sunk < SUNK);
+    let sunk = -asin(clamp(dot(direction, frame.view.zenith), -1.0, 1.0)) - frame.view.horizon_dip;
+    end = select(end, frame.view.beam_start + frame.view.beam_length, way.grounded && sunk < SUNK);
     var depth = aerial_depth(direction, min(way.start, start), start, FIRST_PIECES);
 
-    let one_minus_cosine = one_minus_cos(direction, frame.sun_direction);
+    let one_minus_cosine = one_minus_cos(direction, frame.sky.sun_direction);
     // How far a shadow moves over the ground for each metre of the ray.
-    let sine_sun = dot(frame.zenith, frame.sun_direction);
-    let rise = dot(frame.zenith, direction) / select(min(sine_sun, -0.02), max(sine_sun, 0.02), sine_sun >= 0.0);
-    let spread = length(direction - rise * frame.sun_direction);
+    let sine_sun = dot(frame.view.zenith, frame.sky.sun_direction);
+    let rise = dot(frame.view.zenith, direction) / select(min(sine_sun, -0.02), max(sine_sun, 0.02), sine_sun >= 0.0);
+    let spread = length(direction - rise * frame.sky.sun_direction);
 
     let last = size.z - 1u;
     var lack = vec3f(0.0);
     var slice = 0u;
     var reached = beam_distance(0.0);
     loop {
-        textureStore(volume_out, vec3u(id.xy, slice), vec4f(frame.sky_scale * lack, 1.0));
+        textureStore(volume_out, vec3u(id.xy, slice), vec4f(frame.sky.sky_scale * lack, 1.0));
         let next = beam_distance(f32(slice + 1u) / f32(last));
         // Through the ground to the slice behind it: between the two lies what is read at the ground.
         let to_t = select(min(next, end), next, way.grounded && reached < end);
@@ -54,7 +54,7 @@ fn beams_bake(@builtin(global_invocation_id) id: vec3u) {
         loop {
             let p = (from_t + (f32(i) + 0.5) * step) * direction;
             let h = altitude_at(p);
-            let mu_sun = cos_zenith_at(p, frame.sun_direction);
+            let mu_sun = cos_zenith_at(p, frame.sky.sun_direction);
             let parts = air_parts(h);
             let shade = 1.0 - baked_air_sun(p, h, mu_sun, spread * step);
             // Clouds pass on a part of what they keep, from above, evenly.

@@ -38,24 +38,24 @@ fn composite(
     @builtin(local_invocation_id) local: vec3u,
 ) {
     let id = 8u * spread_rows(group.xy, groups.xy) + local.xy;
-    if id.x >= frame.width || id.y >= frame.rows {
+    if id.x >= frame.view.width || id.y >= dispatch.rows {
         return;
     }
-    compose(vec2u(id.x, frame.first_row + id.y));
+    compose(vec2u(id.x, dispatch.first_row + id.y));
 }
 
-// The pixels that discs of light are seen in: those of `frame.columns` columns from `frame.first_column` on, around a panorama.
+// The pixels that discs of light are seen in: those of `dispatch.columns` columns from `dispatch.first_column` on, around a panorama.
 @compute @workgroup_size(8, 8)
 fn composite_discs(@builtin(global_invocation_id) id: vec3u) {
-    if id.x >= frame.columns || id.y >= frame.rows {
+    if id.x >= dispatch.columns || id.y >= dispatch.rows {
         return;
     }
-    compose(vec2u((frame.first_column + id.x) % frame.width, frame.first_row + id.y));
+    compose(vec2u((dispatch.first_column + id.x) % frame.view.width, dispatch.first_row + id.y));
 }
 
 // A pixel of the picture.
 fn compose(pixel: vec2u) {
-    let index = (pixel.y - frame.sheet_row) * frame.width + pixel.x;
+    let index = (pixel.y - dispatch.sheet_row) * frame.view.width + pixel.x;
     let view = view_direction(vec2f(pixel) + 0.5);
     if view.w == 0.0 {
         image[index] = vec4f(0.0);
@@ -65,7 +65,7 @@ fn compose(pixel: vec2u) {
         }
         return;
     }
-    let at = vec2u(pixel.x, pixel.y - frame.sheet_row);
+    let at = vec2u(pixel.x, pixel.y - dispatch.sheet_row);
     let here = marched_layer(at / TILE, sparse_cell(at / TILE), at.y % TILE * TILE + at.x % TILE);
     let scene = scene_distance(pixel);
     var sight = sight_of(view.xyz, vec2f(pixel), pixel, scene, here);
@@ -81,13 +81,13 @@ fn wide_sky(direction: vec3f, corner: vec2f, grounded: bool) -> vec3f {
     if !WIDE {
         return sky_radiance(direction);
     }
-    let n = frame.sky_samples;
+    let n = frame.view.sky_samples;
     var sum = vec3f(0.0);
     var whole = 0.0;
     for (var i = 0u; i < n * n; i++) {
         let at = corner + (vec2f(vec2u(i % n, i / n)) + 0.5) / f32(n);
         let there = view_direction(at).xyz;
-        let beside = hit_sphere(there, frame.power_ground).enters == grounded;
+        let beside = hit_sphere(there, frame.view.power_ground).enters == grounded;
         let weight = select(0.0, place_weight(at), beside);
         sum += weight * sky_radiance(there);
         whole += weight;
@@ -133,7 +133,7 @@ fn marched_layer(cell: vec2u, sparse: SparseCell, i: u32) -> Layer {
         return Layer(cloud.rgb, cloud.a, select(0.0, distance.x / distance.y, distance.y > 0.0));
     }
     let at = cell_pixel(TILE * cell, i);
-    let index = at.y * frame.width + at.x;
+    let index = at.y * frame.view.width + at.x;
     let cloud = clouds[index];
     return Layer(cloud.rgb, cloud.a, max(cloud_depth[index], 0.0));
 }
@@ -145,7 +145,7 @@ fn put(index: u32, sight: Sight) {
         depth[index] = select(-1.0, sight.seen.distance / covered, covered > 0.0);
     }
     let whole = vec4f(sight.seen.radiance + sight.seen.transmittance * sight.background, sight.opacity);
-    image[index] = select(vec4f(sight.seen.radiance, 1.0 - sight.seen.transmittance), whole, frame.background > 0u);
+    image[index] = select(vec4f(sight.seen.radiance, 1.0 - sight.seen.transmittance), whole, frame.view.background > 0u);
 }
 
 // What is behind the marched clouds is smooth nearly everywhere, and is worked out at the corners of cells. Most of what
@@ -153,7 +153,7 @@ fn put(index: u32, sight: Sight) {
 // ground and air between the corners. Where these bend too, or may have an edge, a pixel is worked out as a whole.
 
 fn cell_columns() -> u32 {
-    return (frame.width + TILE - 1u) / TILE;
+    return (frame.view.width + TILE - 1u) / TILE;
 }
 
 // Cells have a corner more than there are in each direction, and their neighbours one on either side.
@@ -164,13 +164,13 @@ fn corner_index(corner: vec2u) -> u32 {
 // What is behind the marched clouds, and the user's scene, at the corners of the cells of a sheet and of those around it.
 @compute @workgroup_size(8, 8)
 fn backdrop(@builtin(global_invocation_id) id: vec3u) {
-    if id.x >= cell_columns() + 3u || id.y >= (frame.rows + TILE - 1u) / TILE + 3u {
+    if id.x >= cell_columns() + 3u || id.y >= (dispatch.rows + TILE - 1u) / TILE + 3u {
         return;
     }
-    let pixel = (vec2f(id.xy) - 1.0) * f32(TILE) + vec2f(0.0, f32(frame.sheet_row));
+    let pixel = (vec2f(id.xy) - 1.0) * f32(TILE) + vec2f(0.0, f32(dispatch.sheet_row));
     let view = view_direction(pixel + 0.5);
-    let sight = sight_of(view.xyz, pixel, vec2u(0u, frame.sheet_row), NO_SCENE, Layer(vec3f(0.0), 1.0, 0.0));
-    let ground = hit_sphere(view.xyz, frame.power_ground);
+    let sight = sight_of(view.xyz, pixel, vec2u(0u, dispatch.sheet_row), NO_SCENE, Layer(vec3f(0.0), 1.0, 0.0));
+    let ground = hit_sphere(view.xyz, frame.view.power_ground);
     var layer = vec4f(sight.seen.radiance, sight.seen.transmittance);
     var distance = sight.seen.distance;
     var air = sight.high_air;
@@ -199,12 +199,12 @@ fn backdrop(@builtin(global_invocation_id) id: vec3u) {
 fn is_fine(direction: vec3f, ground: Hit) -> bool {
     var fine = false;
     if HIGH {
-        let far = hit_sphere(direction, frame.power_high).far;
+        let far = hit_sphere(direction, frame.view.power_high).far;
         let across = cell_across(direction, far, params.high_clouds.altitude);
         fine = !ground.enters && across > FIBRE * params.high_clouds.scale;
     }
     if GROUND_SHADOW {
-        let q = ground.near * direction.xy + frame.shadow_eye;
+        let q = ground.near * direction.xy + frame.sky.shadow_eye;
         var most = SHADOW_EDGE * shadow_texel(shadow_level(q, 0.0));
         if HIGH {
             most = min(most, FIBRE * params.high_clouds.scale);
@@ -229,10 +229,10 @@ fn composite_cells(
 ) {
     let id = 8u * spread_rows(group.xy, groups.xy) + local.xy;
     let columns = cell_columns();
-    if id.x >= columns || id.y >= (frame.rows + TILE - 1u) / TILE {
+    if id.x >= columns || id.y >= (dispatch.rows + TILE - 1u) / TILE {
         return;
     }
-    let first = vec2u(id.x * TILE, frame.sheet_row + id.y * TILE);
+    let first = vec2u(id.x * TILE, dispatch.sheet_row + id.y * TILE);
     // Written out: lavapipe keeps in memory what a loop indexes.
     let c0 = corner_index(id.xy + 1u);
     let c1 = c0 + 1u;
@@ -254,7 +254,7 @@ fn composite_cells(
     let along = max(max(bend_along(above), bend_along(upper)), max(bend_along(lower), bend_along(below)));
     let across = max(bend_across(above, upper, lower), bend_across(upper, lower, below));
     let brightest = max(max(v0.x, v1.x), max(v2.x, v3.x));
-    let bends = max(along, across) > CURVATURE * quality.contrast * vec3f(brightest, 1.0, brightest);
+    let bends = max(along, across) > CURVATURE * params.quality.contrast * vec3f(brightest, 1.0, brightest);
     let nearest = min(min(behind[0].w, behind[1].w), min(behind[2].w, behind[3].w));
     let farthest = max(max(behind[0].w, behind[1].w), max(behind[2].w, behind[3].w));
     // The horizon is an edge, however bright.
@@ -268,18 +268,18 @@ fn composite_cells(
     // It does not matter what opaque clouds hide, but to who asks for the sky.
     var hidden = false;
     if !LAYERS && !CLOUDLESS {
-        hidden = (edge || fine) && (!HIGH || (!VOLUME && frame.shell_top <= params.high_clouds.altitude));
+        hidden = (edge || fine) && (!HIGH || (!VOLUME && frame.sky.shell_top <= params.high_clouds.altitude));
         let c = sparse.clouds;
         hidden = hidden && (!SPARSE || all(vec4f(c[0].a, c[1].a, c[2].a, c[3].a) == vec4f(0.0)));
     }
     if !SPARSE && !LAYERS && !CLOUDLESS {
-        let last = vec2u(frame.width, frame.sheet_row + frame.rows) - 1u;
+        let last = vec2u(frame.view.width, dispatch.sheet_row + dispatch.rows) - 1u;
         var i = 0u;
         // It leaves soon: most cells show something, and those that do not ask are never hidden. Once false, it stays so,
         // whatever lavapipe computes for a cell that has left.
         loop {
             let pixel = min(cell_pixel(first, i), last);
-            hidden = hidden && clouds[(pixel.y - frame.sheet_row) * frame.width + pixel.x].a == 0.0;
+            hidden = hidden && clouds[(pixel.y - dispatch.sheet_row) * frame.view.width + pixel.x].a == 0.0;
             i++;
             if !hidden || i == TILE * TILE {
                 break;
@@ -314,7 +314,7 @@ fn composite_cells(
             if fine_high && in_sheet(first, n) {
                 let direction = view_direction(vec2f(cell_pixel(first, n)) + 0.5).xyz;
                 let turned = seen_turn(direction, vec2f(cell_pixel(first, n)));
-                let layer = high_layer(direction, hit_sphere(direction, frame.power_high).far, true, turned);
+                let layer = high_layer(direction, hit_sphere(direction, frame.view.power_high).far, true, turned);
                 let shares = corner_shares(n);
                 let before = Air((air * shares).rgb, (haze * shares).rgb);
                 put_behind(sheet_index(first, n), marched_layer(id.xy, sparse, n), through_air(layer, before), (behind * shares).rgb);
@@ -330,8 +330,8 @@ fn composite_cells(
         loop {
             if fine_ground && in_sheet(first, n) {
                 let direction = view_direction(vec2f(cell_pixel(first, n)) + 0.5).xyz;
-                let p = hit_sphere(direction, frame.power_ground).near * direction;
-                let sun = ground_sun(p, cos_zenith_at(p, frame.sun_direction));
+                let p = hit_sphere(direction, frame.view.power_ground).near * direction;
+                let sun = ground_sun(p, cos_zenith_at(p, frame.sky.sun_direction));
                 let shares = corner_shares(n);
                 let lit = (behind * shares).rgb - (1.0 - sun) * (air * shares).rgb;
                 put_behind(sheet_index(first, n), marched_layer(id.xy, sparse, n), Layer(vec3f(0.0), 1.0, 0.0), lit);
@@ -373,12 +373,12 @@ fn cell_pixel(first: vec2u, i: u32) -> vec2u {
 }
 
 fn in_sheet(first: vec2u, i: u32) -> bool {
-    return all(cell_pixel(first, i) < vec2u(frame.width, frame.sheet_row + frame.rows));
+    return all(cell_pixel(first, i) < vec2u(frame.view.width, dispatch.sheet_row + dispatch.rows));
 }
 
 fn sheet_index(first: vec2u, i: u32) -> u32 {
     let pixel = cell_pixel(first, i);
-    return (pixel.y - frame.sheet_row) * frame.width + pixel.x;
+    return (pixel.y - dispatch.sheet_row) * frame.view.width + pixel.x;
 }
 
 // Shares of a cell's corners in a pixel.
@@ -410,7 +410,7 @@ fn put_behind(index: u32, here: Layer, high: Layer, background: vec3f) {
 
 // How near the user's scene comes in a cell.
 fn nearest_scene(first: vec2u) -> f32 {
-    let last = vec2u(frame.width, frame.sheet_row + frame.rows) - 1u;
+    let last = vec2u(frame.view.width, dispatch.sheet_row + dispatch.rows) - 1u;
     var nearest = NO_SCENE;
     for (var i = 0u; i < TILE * TILE; i++) {
         nearest = min(nearest, scene_distance(min(cell_pixel(first, i), last)));
@@ -421,15 +421,15 @@ fn nearest_scene(first: vec2u) -> f32 {
 // The pixels of the cells of the list.
 @compute @workgroup_size(64)
 fn composite_list(@builtin(global_invocation_id) id: vec3u) {
-    let number = frame.first_ray + id.x;
+    let number = dispatch.first_ray + id.x;
     if number >= listed.w {
         return;
     }
     let cell = active_rays[number / (TILE * TILE)];
     let i = number % (TILE * TILE);
     let pixel = TILE * vec2u(cell % cell_columns(), cell / cell_columns()) + vec2u(i % TILE, i / TILE);
-    if all(pixel < vec2u(frame.width, frame.rows)) {
-        compose(pixel + vec2u(0u, frame.sheet_row));
+    if all(pixel < vec2u(frame.view.width, dispatch.rows)) {
+        compose(pixel + vec2u(0u, dispatch.sheet_row));
     }
 }
 
@@ -452,7 +452,7 @@ fn sight_to(seen: Layer, background: vec3f) -> Sight {
 // What is seen in a direction, with the clouds that were marched there, to the user's scene at a pixel. `corner` is that of the
 // pixel that looks there.
 fn sight_of(direction: vec3f, corner: vec2f, pixel: vec2u, scene: f32, here: Layer) -> Sight {
-    let ground = hit_sphere(direction, frame.power_ground);
+    let ground = hit_sphere(direction, frame.view.power_ground);
     var way = Way(0.0, 0.0, ground.enters);
     var texels = AirTexels(vec2f(0.0), vec2f(0.0));
     var sky_behind = vec3f(0.0);
@@ -469,11 +469,11 @@ fn sight_of(direction: vec3f, corner: vec2f, pixel: vec2u, scene: f32, here: Lay
     if HIGH {
         // The high clouds where the ray enters their sphere, which it cannot from inside, and where it leaves it; each
         // before or behind the clouds. The loop costs lavapipe one of the two where there is one, a branch both.
-        let high = hit_sphere(direction, frame.power_high);
+        let high = hit_sphere(direction, frame.view.power_high);
         let turned = seen_turn(direction, corner);
         var before = Layer(vec3f(0.0), 1.0, 0.0);
         var behind = before;
-        var crossing = select(0, 1, frame.power_high <= 0.0);
+        var crossing = select(0, 1, frame.view.power_high <= 0.0);
         loop {
             let at = select(high.near, high.far, crossing == 1);
             let hit = high.hit && at > 0.0 && at < scene && !(ground.enters && at > ground.near);
@@ -494,9 +494,9 @@ fn sight_of(direction: vec3f, corner: vec2f, pixel: vec2u, scene: f32, here: Lay
 
     if ground.enters {
         let p = ground.near * direction;
-        found.background += air.transmittance * ground_radiance(cos_zenith_at(p, frame.sun_direction));
+        found.background += air.transmittance * ground_radiance(cos_zenith_at(p, frame.sky.sun_direction));
         if GROUND_SHADOW {
-            let mu = cos_zenith_at(p, frame.sun_direction);
+            let mu = cos_zenith_at(p, frame.sky.sun_direction);
             found.sunlight = air.transmittance * kept_sunlight(mu);
             found.shadow = (1.0 - ground_sun(p, mu)) * found.sunlight;
             found.background = max(found.background - found.shadow, vec3f(0.0));
@@ -506,7 +506,7 @@ fn sight_of(direction: vec3f, corner: vec2f, pixel: vec2u, scene: f32, here: Lay
         let bright = scene_radiance(pixel);
         let before = air_to(direction, scene, way, texels, sky_behind);
         found.background = through_air(Layer(bright, 0.0, scene), before).radiance;
-        if frame.scene_lit == 0u {
+        if frame.view.scene_lit == 0u {
             // The caller puts a scene of his own behind: what he adds is dimmed by cloud and air.
             let white = through_air(Layer(vec3f(1.0), 0.0, scene), before).radiance;
             found.opacity = 1.0 - found.seen.transmittance * dot(white - found.background, LUMINANCE);

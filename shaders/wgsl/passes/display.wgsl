@@ -4,12 +4,12 @@
 
 @compute @workgroup_size(8, 8)
 fn display(@builtin(global_invocation_id) id: vec3u) {
-    let pixel = vec2u(id.x, frame.first_row + id.y);
-    if id.x >= frame.width || id.y >= frame.rows {
+    let pixel = vec2u(id.x, dispatch.first_row + id.y);
+    if id.x >= frame.view.width || id.y >= dispatch.rows {
         return;
     }
     // Exposure as a factor, and which of color.rs's TONE_MAPS.
-    let radiance = shown.x * image[pixel.y * frame.width + pixel.x].rgb;
+    let radiance = shown.x * image[pixel.y * frame.view.width + pixel.x].rgb;
     var color = encode_srgb(radiance);
     if shown.y == 0.0 {
         color = agx(radiance);

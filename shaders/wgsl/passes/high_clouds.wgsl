@@ -137,8 +137,8 @@ struct Octave {
 
 fn octave_at(i: u32) -> Octave {
     // Small octaves are replaced more often; between two updates each fades linearly from the old to the new.
-    let age = select(frame.high_age, frame.high_age_small, i >= 4u)[i % 4u];
-    let update = u32(select(frame.high_update, frame.high_update_small, i >= 4u)[i % 4u]);
+    let age = select(frame.sky.high_age, frame.sky.high_age_small, i >= 4u)[i % 4u];
+    let update = u32(select(frame.sky.high_update, frame.sky.high_update_small, i >= 4u)[i % 4u]);
     // The numbers come round (frame.rs): after the last update comes the first.
     let salts = i * 7u + vec2u(update, (update + 1u) % UPDATES) * 977u;
     return Octave(salts, age, steadied(age));

@@ -15,10 +15,10 @@ fn march(
     @builtin(local_invocation_id) local: vec3u,
 ) {
     let id = 8u * spread_over(group.xy, groups.xy) + local.xy;
-    if id.x >= frame.march_width || id.y >= frame.rows {
+    if id.x >= dispatch.march_width || id.y >= dispatch.rows {
         return;
     }
-    march_cell((frame.first_row - frame.sheet_row + id.y) * frame.march_width + id.x, EVERYWHERE);
+    march_cell((dispatch.first_row - dispatch.sheet_row + id.y) * dispatch.march_width + id.x, EVERYWHERE);
 }
 
 // Marches the pixels of a list (passes/refine).
@@ -28,12 +28,12 @@ fn march_list(
     @builtin(num_workgroups) groups: vec3u,
     @builtin(local_invocation_id) local: vec3u,
 ) {
-    let number = frame.first_ray + 64u * spread(group.x, groups.x) + local.x;
+    let number = dispatch.first_ray + 64u * spread(group.x, groups.x) + local.x;
     if number >= listed.w {
         return;
     }
     let index = active_rays[number];
-    let known = select(EVERYWHERE, cloud_span[index], frame.spans > 0u);
+    let known = select(EVERYWHERE, cloud_span[index], dispatch.spans > 0u);
     cloud_span[index] = march_cell(index, known);
 }
 
@@ -45,7 +45,7 @@ const NOWHERE = vec2f(1e30, 0.0);
 
 // Marches the ray of a cell of the sheet within a span, and returns the span of its clouds.
 fn march_cell(index: u32, within: vec2f) -> vec2f {
-    let cell = vec2u(index % frame.march_width, frame.sheet_row + index / frame.march_width);
+    let cell = vec2u(index % dispatch.march_width, dispatch.sheet_row + index / dispatch.march_width);
     let pixel = marched_pixel(cell);
     let view = view_direction(vec2f(pixel) + 0.5);
     var cloud = Cloud(vec3f(0.0), 1.0, -1.0, NOWHERE);
@@ -110,7 +110,7 @@ fn march_pixel(pixel: vec2u, view: vec3f, within: vec2f) -> Cloud {
 fn ray_offset(pixel: vec2u) -> f32 {
     let rank = textureLoad(blue_noise, pixel % 64u, 0).r;
     // The largest rank is 1 as a half float.
-    return select(0.5, fract(rank), quality.jitter > 0u);
+    return select(0.5, fract(rank), params.quality.jitter > 0u);
 }
 
 // The steps of a ray: `count` of them over `length` metres, growing with distance by `growth` per metre.
@@ -131,17 +131,17 @@ const TWO_DECKS = 1.5;
 const SHARED_STEPS = 0.5;
 
 fn ray_steps(start: f32, length: f32, direction: vec3f, rays: f32) -> Steps {
-    let slant = 1.0 - abs(dot(direction, frame.zenith));
-    let count = mix(f32(quality.steps_zenith), f32(quality.steps_horizon), slant);
+    let slant = 1.0 - abs(dot(direction, frame.view.zenith));
+    let count = mix(f32(params.quality.steps_zenith), f32(params.quality.steps_horizon), slant);
     // At full growth a step is a fixed share of its distance plus 300 m: rays that start in the cloud have fine steps
     // near the eye (10 m, where 1 km would give 25 and show them as grain), rays that start far away nearly equal ones.
-    var growth = quality.step_growth / (start + 300.0);
+    var growth = params.quality.step_growth / (start + 300.0);
     growth = select(growth, 0.0, growth * length < 1e-3);
     // A ray from inside the clouds, or from just above them, has to cover many more distances than one from the ground:
     // it gets up to twice the steps, or its far clouds are grain.
     let reach = log(1.0 + growth * length);
     // So does one through two decks: with as many steps as through one, those of `two_decks` err by a half more.
-    let decks = select(1.0, mix(1.0, TWO_DECKS, frame.upper_shown), UPPER && growth > 0.0);
+    let decks = select(1.0, mix(1.0, TWO_DECKS, frame.sky.upper_shown), UPPER && growth > 0.0);
     let whole = round(count * clamp(decks * sqrt(reach), 1.0, 2.0));
     let steps = max(round(whole * max(1.0 / rays, SHARED_STEPS)), 1.0);
     let each = reach / steps;
@@ -231,22 +231,22 @@ struct Leaps {
 const PROFILE_SLOPE = 8.0;
 
 fn ray_leaps(direction: vec3f, medium: u32) -> Leaps {
-    var reach = quality.leap * frame.leap_scale;
+    var reach = params.quality.leap * frame.sky.leap_scale;
     var thickness = params.clouds.top - params.clouds.base;
     if UPPER && medium == UPPER_CLOUD {
         reach *= params.upper_clouds.scale;
         thickness = params.upper_clouds.top - params.upper_clouds.base;
     }
-    return Leaps(reach, 1.0 + PROFILE_SLOPE * abs(dot(direction, frame.zenith)) * reach / thickness);
+    return Leaps(reach, 1.0 + PROFILE_SLOPE * abs(dot(direction, frame.view.zenith)) * reach / thickness);
 }
 
 // The steps from a point without cloud to where to look next: `big_step` of them, or more the more the shape lacks, as the
 // noise changes no faster than so much in a metre (Hart 1996, "sphere tracing", with a slope that is measured, not a bound).
 // Its threshold is what the profile lets through, here and, with none, at any height. Not to where another medium may be.
 fn steps_to_next(steps: Steps, direction: vec3f, column: Column, noise: f32, at: Sample) -> u32 {
-    let big = f32(quality.big_step);
+    let big = f32(params.quality.big_step);
     if VOLUME {
-        return quality.big_step;
+        return params.quality.big_step;
     }
     let leaps = ray_leaps(direction, column.medium);
     // By the chart, on which noise and cover change as fast everywhere.
@@ -278,13 +278,13 @@ fn way_to_rain(direction: vec3f, at: Sample) -> f32 {
 // Where a spot is kept clear there is no more than without it, and leaps from outside hold; within it, to where the cover
 // begins, and in its rim none.
 fn way_to_rim(at: Sample) -> f32 {
-    let away = length(on_chart(at.p, at.altitude) - frame.clear_at);
-    return select(max(frame.clear_radius - away, 0.0), 1e30, away >= 1.5 * frame.clear_radius);
+    let away = length(on_chart(at.p, at.altitude) - frame.sky.clear_at);
+    return select(max(frame.sky.clear_radius - away, 0.0), 1e30, away >= 1.5 * frame.sky.clear_radius);
 }
 
 // A leap within a deck, no farther than to the other one; between both, all the way there.
 fn way_to_decks(direction: vec3f, leap: f32, at: Sample) -> f32 {
-    let over = at.altitude - frame.lower_top;
+    let over = at.altitude - frame.sky.lower_top;
     let under = params.upper_clouds.base - at.altitude;
     let mu = cos_zenith_along(direction, at.t, at.altitude);
     let way = max(select(over, under, mu > 0.0), 0.0) / (abs(mu) + BEND_OF_LEAP);
@@ -292,7 +292,7 @@ fn way_to_decks(direction: vec3f, leap: f32, at: Sample) -> f32 {
         return way;
     }
     // Towers may reach into the deck above: there neither is alone, as soon as that shows.
-    let alone = leap * select(1.0, 1.0 - frame.upper_shown, over <= 0.0 && under <= 0.0);
+    let alone = leap * select(1.0, 1.0 - frame.sky.upper_shown, over <= 0.0 && under <= 0.0);
     return select(alone, min(alone, way), way > 0.0);
 }
 
@@ -316,7 +316,7 @@ fn march_ray(direction: vec3f, turned: Turn, limit: f32, offset: f32, within: ve
 
     var sum = Gathered();
 
-    let big = quality.big_step;
+    let big = params.quality.big_step;
     // Measured on `fair_weather`: one big step of slack errs by 6 %, 4 by 2 %, 8 as little as all of the ray, in 3 % more time.
     let slack = f32(8u * big);
     let end = u32(clamp(step_index(steps, within.y) + slack, 0.0, f32(steps.count)));
@@ -357,7 +357,7 @@ fn march_ray(direction: vec3f, turned: Turn, limit: f32, offset: f32, within: ve
             let noise = base_noise(column);
             let shape = shape_in(column, noise);
             // Leaps outside clouds; on a hit back by what was leapt over.
-            let searching = empty >= quality.empty_samples;
+            let searching = empty >= params.quality.empty_samples;
             let hit = !(shape <= 0.0); // not "shape > 0": with that, a NaN would stand still for ever
             let back = select(i, max(i - min(i, leapt - 1u), seen), searching);
             let full = hit && back == i;
@@ -370,16 +370,16 @@ fn march_ray(direction: vec3f, turned: Turn, limit: f32, offset: f32, within: ve
             i = select(i + select(1u, leapt, searching && !hit), back, hit && !full);
             seen = select(seen, i, full || !searching);
             if density > 0.0 {
-                let x = density * frame.extinction * at.length;
+                let x = density * frame.sky.extinction * at.length;
                 let weight = transmittance * x * one_minus_exp_over(x);
                 group = with_sample(group, weight, 1.0 - transmittance, at, column);
                 reached += weight * at.t;
                 span = vec2f(min(span.x, at.begin), at.begin + at.length);
                 optical_depth += x;
                 transmittance = transmittance_of(optical_depth);
-                i = select(i, end, transmittance < quality.min_transmittance);
+                i = select(i, end, transmittance < params.quality.min_transmittance);
             }
-            let share = rays * quality.light_share * select(1.0, RAIN_SHARE, RAIN_SHAFTS && column.medium == RAIN);
+            let share = rays * params.quality.light_share * select(1.0, RAIN_SHARE, RAIN_SHAFTS && column.medium == RAIN);
             if group.weight > select(share, 0.0, i >= end) {
                 groups[count] = group;
                 count += 1u;
@@ -415,7 +415,7 @@ fn march_ray(direction: vec3f, turned: Turn, limit: f32, offset: f32, within: ve
     }
 
     var scale = 1.0;
-    if transmittance < quality.min_transmittance {
+    if transmittance < params.quality.min_transmittance {
         // What the rest of the ray would have added is taken to be like what was seen.
         scale = 1.0 / (1.0 - transmittance);
         transmittance = 0.0;

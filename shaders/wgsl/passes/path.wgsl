@@ -30,11 +30,11 @@ const FAINT = 0.1;
 
 @compute @workgroup_size(64)
 fn path(@builtin(global_invocation_id) id: vec3u) {
-    if id.x >= frame.active_rays {
+    if id.x >= dispatch.active_rays {
         return;
     }
     let index = active_rays[id.x];
-    let pixel = vec2u(index % frame.width, frame.sheet_row + index / frame.width);
+    let pixel = vec2u(index % frame.view.width, dispatch.sheet_row + index / frame.view.width);
     let middle = view_direction(vec2f(pixel) + 0.5);
     let rays = rays_through(middle.xyz);
     let seen = seen_turn(middle.xyz, vec2f(pixel));
@@ -44,12 +44,12 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
     var ray = path_rays[index];
     evaluations = ray.evaluations;
     var turns = 0u;
-    for (; turns < frame.budget && ray.stage != DONE; turns++) {
+    for (; turns < dispatch.budget && ray.stage != DONE; turns++) {
         if ray.stage == START {
             ray.origin = vec3f(0.0);
             var view = middle;
             if SUBRAYS {
-                let place = random3(vec3u(pixel.y * frame.width + pixel.x, frame.first_sample + ray.done, 0u), 0u).xy;
+                let place = random3(vec3u(pixel.y * frame.view.width + pixel.x, frame.view.first_sample + ray.done, 0u), 0u).xy;
                 view = vec4f(view_direction(ray_place(pixel, place, rays)).xyz, middle.w);
             }
             ray.direction = view.xyz;
@@ -66,10 +66,10 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
         // A step: to a collision that is real or not, or as far as the majorant holds.
         let s = Stretches(ray.flight.x, ray.flight.y, ray.flight.z, ray.flight.w);
         let length = s.first + s.second;
-        let direction = select(frame.sun_direction, ray.direction, ray.stage == FLIGHT);
+        let direction = select(frame.sky.sun_direction, ray.direction, ray.stage == FLIGHT);
         let here = ray.origin + stretch_distance(s, ray.x) * direction;
         let majorant = majorant_at(here, altitude_at(here));
-        let free = max(-log(1.0 - u.x) / max(majorant.density * frame.extinction, 1e-30), SHORTEST);
+        let free = max(-log(1.0 - u.x) / max(majorant.density * frame.sky.extinction, 1e-30), SHORTEST);
         let before_gap = ray.x < s.first && s.second > 0.0;
         let room = select(length, s.first, before_gap) - ray.x;
         // Never without progress, whatever is rounded.
@@ -103,13 +103,13 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
                 }
                 ray.origin = p;
                 ray.x = 0.0;
-                if ray.scatterings > quality.path_scatterings {
+                if ray.scatterings > params.quality.path_scatterings {
                     ray = path_ended(ray);
                 } else if sunlit {
-                    let phase = select(model_phase(one_minus_cos(direction, frame.sun_direction)), seen.phase, ray.scatterings == 1u);
+                    let phase = select(model_phase(one_minus_cos(direction, frame.sky.sun_direction)), seen.phase, ray.scatterings == 1u);
                     ray.sunlight = ray.throughput * phase * sun_at(p);
                     ray.shadow = 1.0;
-                    ray.flight = flight_from(p, frame.sun_direction);
+                    ray.flight = flight_from(p, frame.sky.sun_direction);
                     ray.stage = SHADOW;
                 } else {
                     ray = scattered_on(ray, pixel);
@@ -127,7 +127,7 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
                 ray = scattered_on(ray, pixel);
             }
         }
-        if ray.stage == START && ray.done >= quality.path_samples {
+        if ray.stage == START && ray.done >= params.quality.path_samples {
             write_pixel(ray, index);
             ray.stage = DONE;
         }
@@ -140,12 +140,12 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
 // Three random numbers in [0, 1), never the same for two pixels, paths or turns.
 fn draw(ray: ptr<function, PathRay>, pixel: vec2u) -> vec3f {
     (*ray).draws += 1u;
-    return random3(vec3u(pixel.y * frame.width + pixel.x, frame.first_sample + (*ray).done, (*ray).draws), 0u);
+    return random3(vec3u(pixel.y * frame.view.width + pixel.x, frame.view.first_sample + (*ray).done, (*ray).draws), 0u);
 }
 
 fn sun_at(p: vec3f) -> vec3f {
     if AIR {
-        return sun_irradiance(altitude_at(p), cos_zenith_at(p, frame.sun_direction));
+        return sun_irradiance(altitude_at(p), cos_zenith_at(p, frame.sky.sun_direction));
     }
     return sky_light[2].rgb;
 }
@@ -181,7 +181,7 @@ fn scattered_on(given: PathRay, pixel: vec2u) -> PathRay {
     }
     if ray.stage == GROUND {
         // By Lambert's law about the local zenith.
-        let up = normalize(frame.zenith * frame.centre_distance + ray.origin);
+        let up = normalize(frame.view.zenith * frame.view.centre_distance + ray.origin);
         let side = perpendicular(up);
         let angle = 2.0 * PI * u.y - PI;
         let level = cos(angle) * side + sin(angle) * cross(up, side);
@@ -214,15 +214,15 @@ fn escaped(given: PathRay, pixel: vec2u) -> PathRay {
         return path_ended(ray);
     }
     ray.scatterings += 1u;
-    if ray.scatterings > quality.path_scatterings {
+    if ray.scatterings > params.quality.path_scatterings {
         return path_ended(ray);
     }
     ray.origin += ground.near * ray.direction;
     ray.throughput *= params.atmosphere.ground_albedo;
-    let mu = max(cos_zenith_at(ray.origin, frame.sun_direction), 0.0);
+    let mu = max(cos_zenith_at(ray.origin, frame.sky.sun_direction), 0.0);
     ray.sunlight = ray.throughput / PI * mu * sun_irradiance(0.0, mu);
     ray.shadow = select(0.0, 1.0, mu > 0.0);
-    ray.flight = flight_from(ray.origin, frame.sun_direction);
+    ray.flight = flight_from(ray.origin, frame.sky.sun_direction);
     ray.x = 0.0;
     ray.stage = GROUND;
     return ray;

@@ -8,12 +8,12 @@
 // Extinction in 1/m, the field that `march` marches.
 @compute @workgroup_size(64)
 fn extinction_at_points(@builtin(global_invocation_id) id: vec3u) {
-    if id.x >= frame.width {
+    if id.x >= dispatch.columns {
         return;
     }
     let p = points[id.x].xyz;
     let altitude = altitude_at(p);
-    results[id.x] = vec4f(cloud_density_at(p, altitude, 0.0) * frame.extinction, 0.0, 0.0, 0.0);
+    results[id.x] = vec4f(cloud_density_at(p, altitude, 0.0) * frame.sky.extinction, 0.0, 0.0, 0.0);
 }
 
 // So that lavapipe's limit of 65,535 iterations over a shader is never met (hazard 21).
@@ -21,21 +21,21 @@ const MAX_SUN_PANELS = 16384u;
 
 @compute @workgroup_size(64)
 fn sun_transmittance_at_points(@builtin(global_invocation_id) id: vec3u) {
-    if id.x >= frame.width {
+    if id.x >= dispatch.columns {
         return;
     }
     let p = points[id.x].xyz;
-    if hit_ground_from(p, frame.sun_direction).enters {
+    if hit_ground_from(p, frame.sky.sun_direction).enters {
         results[id.x] = vec4f(0.0);
         return;
     }
-    results[id.x] = vec4f(exp(-depth_from(p, frame.sun_direction)), 0.0, 0.0, 0.0);
+    results[id.x] = vec4f(exp(-depth_from(p, frame.sky.sun_direction)), 0.0, 0.0, 0.0);
 }
 
 // Optical depth of all clouds from the eye along directions; -1 where the ground is in the way.
 @compute @workgroup_size(64)
 fn depth_along_directions(@builtin(global_invocation_id) id: vec3u) {
-    if id.x >= frame.width {
+    if id.x >= dispatch.columns {
         return;
     }
     let direction = points[id.x].xyz;

@@ -34,11 +34,11 @@ const DARK = 1e-6;
 
 @compute @workgroup_size(64)
 fn reference(@builtin(global_invocation_id) id: vec3u) {
-    if id.x >= frame.active_rays {
+    if id.x >= dispatch.active_rays {
         return;
     }
     let index = active_rays[id.x];
-    let pixel = vec2u(index % frame.width, frame.sheet_row + index / frame.width);
+    let pixel = vec2u(index % frame.view.width, dispatch.sheet_row + index / frame.view.width);
     let view = view_direction(vec2f(pixel) + 0.5);
     let direction = view.xyz;
     let stretches = stretches_before(cloud_stretches(direction), scene_distance(pixel));
@@ -53,7 +53,7 @@ fn reference(@builtin(global_invocation_id) id: vec3u) {
     var ray = reference_rays[index];
     evaluations = ray.evaluations;
     var turns = 0u;
-    for (; turns < frame.budget && ray.stage != DONE; turns++) {
+    for (; turns < dispatch.budget && ray.stage != DONE; turns++) {
         let finer = exp2(-f32(ray.level));
         if ray.stage == START {
             ray.x = 0.0;
@@ -73,7 +73,7 @@ fn reference(@builtin(global_invocation_id) id: vec3u) {
         let t = stretch_distance(stretches, select(ray.x, from_point, toward_sun));
         let width = t * pixel_size;
         let origin = select(vec3f(0.0), t * direction, toward_sun);
-        let along = select(direction, frame.sun_direction, toward_sun);
+        let along = select(direction, frame.sky.sun_direction, toward_sun);
         var s = stretches;
         if toward_sun {
             s = Stretches(ray.sun_start, ray.sun_first, ray.sun_gap, ray.sun_second);
@@ -84,7 +84,7 @@ fn reference(@builtin(global_invocation_id) id: vec3u) {
         var longest = finer * max(clamp(width, 2.0 * finest_feature(), coarsest_panel()), fair);
         if VOLUME {
             // Cells end the panels toward the sun; those of the view are halved, as their light is no cubic.
-            longest = select(finer * frame.voxel, 1e30, toward_sun);
+            longest = select(finer * frame.sky.voxel, 1e30, toward_sun);
         }
         // Sun rays are halved once: past that pictures change by less than 0.12 % and take five to ten times as long.
         longest = select(min(longest, ray.longest), longest * max(1.0, 0.5 / finer), toward_sun);
@@ -130,7 +130,7 @@ fn reference(@builtin(global_invocation_id) id: vec3u) {
             ray.sun_x = 0.0;
             ray.sun_depth = 0.0;
             let from_here = panel_points(Panel(ray.x, ray.end))[ray.point];
-            let sun = cloud_stretches_from(stretch_distance(stretches, from_here) * direction, frame.sun_direction);
+            let sun = cloud_stretches_from(stretch_distance(stretches, from_here) * direction, frame.sky.sun_direction);
             ray.sun_start = sun.start;
             ray.sun_first = sun.first;
             ray.sun_gap = sun.gap;
@@ -148,7 +148,7 @@ fn reference(@builtin(global_invocation_id) id: vec3u) {
                 sun.y = seen_scattering(ray.sun_depth, ray.precipitation.y, turned);
             }
             let uneven = abs(ray.sun_depth - ray.first_depth) > finer * UNEVEN
-                && weight * abs(sun.x - sun.y) > 0.1 * quality.tolerance * (dot(ray.sun, vec4f(1.0)) + DARK);
+                && weight * abs(sun.x - sun.y) > 0.1 * params.quality.tolerance * (dot(ray.sun, vec4f(1.0)) + DARK);
             ray.stage = VIEW;
             if uneven && ray.end - ray.x > 1.5 * shortest_panel(stretches, ray.x) {
                 ray.longest = 0.5 * (ray.end - ray.x);
@@ -183,7 +183,7 @@ fn finished(given: ReferenceRay, index: u32, nodes: Nodes, direction: vec3f, emp
     let result = vec4f(gathered_radiance(sum, nodes, direction), transmittance_of(ray.optical_depth));
     let change = abs(result - ray.previous);
     let dark = DARK * sky_light[2].rgb;
-    let steady = all(change.rgb <= quality.tolerance * (result.rgb + dark)) && change.a <= 0.1 * quality.tolerance;
+    let steady = all(change.rgb <= params.quality.tolerance * (result.rgb + dark)) && change.a <= 0.1 * params.quality.tolerance;
     if empty || (ray.level > 0u && steady) || ray.level >= MOST_HALVINGS || (ray.level > 0u && evaluations > MOST_EVALUATIONS) {
         clouds[index] = select(result, vec4f(0.0, 0.0, 0.0, 1.0), empty);
         cloud_depth[index] = select(-1.0, ray.distance / whole, !empty && whole > 0.0);

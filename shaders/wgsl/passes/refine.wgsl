@@ -1,6 +1,6 @@
 // Which pixels need rays of their own: pixels between marched ones that look alike are interpolated.
 //
-// A lattice of pixels `frame.lattice` apart, with the last column and row, is known. This halves the distance: each pixel
+// A lattice of pixels `dispatch.lattice` apart, with the last column and row, is known. This halves the distance: each pixel
 // that the finer lattice adds is put on the list of rays, or gets its value here. An invocation has a square of the
 // lattice: the pixel in its middle, and those of its upper and its left edge, which it shares with its neighbours.
 #import bindings
@@ -12,13 +12,13 @@
 // Lists the pixels of the lattice.
 @compute @workgroup_size(8, 8)
 fn list_lattice(@builtin(global_invocation_id) id: vec3u) {
-    let last = vec2u(frame.march_width, frame.sheet_rows) - 1u;
-    let size = (last + frame.lattice - 1u) / frame.lattice + 1u;
+    let last = vec2u(dispatch.march_width, dispatch.sheet_rows) - 1u;
+    let size = (last + dispatch.lattice - 1u) / dispatch.lattice + 1u;
     if any(id.xy >= size) {
         return;
     }
-    let pixel = min(id.xy * frame.lattice, last);
-    active_rays[id.y * size.x + id.x] = pixel.y * frame.march_width + pixel.x;
+    let pixel = min(id.xy * dispatch.lattice, last);
+    active_rays[id.y * size.x + id.x] = pixel.y * dispatch.march_width + pixel.x;
     if all(id.xy == vec2u(0u)) {
         atomicStore(&ray_count, size.x * size.y);
     }
@@ -26,20 +26,20 @@ fn list_lattice(@builtin(global_invocation_id) id: vec3u) {
 
 @compute @workgroup_size(8, 8)
 fn refine(@builtin(global_invocation_id) id: vec3u) {
-    let last = vec2u(frame.march_width, frame.sheet_rows) - 1u;
-    if any(id.xy > (last + frame.lattice - 1u) / frame.lattice) {
+    let last = vec2u(dispatch.march_width, dispatch.sheet_rows) - 1u;
+    if any(id.xy > (last + dispatch.lattice - 1u) / dispatch.lattice) {
         return;
     }
-    let half = frame.lattice / 2u;
-    let low = min(id.xy * frame.lattice, last);
-    let high = min(low + frame.lattice, last);
+    let half = dispatch.lattice / 2u;
+    let low = min(id.xy * dispatch.lattice, last);
+    let high = min(low + dispatch.lattice, last);
     let middle = low + half;
     let has = middle < high; // room for a pixel between the columns, between the rows
     if !any(has) {
         return;
     }
     // Of the squares above and to the left, narrower behind the last column and row; on the rim the square itself again.
-    let before = (max(low, vec2u(1u)) - 1u) / frame.lattice * frame.lattice;
+    let before = (max(low, vec2u(1u)) - 1u) / dispatch.lattice * dispatch.lattice;
 
     let a = read(low);
     let b = read(vec2u(high.x, low.y));
@@ -69,7 +69,7 @@ struct Known {
 }
 
 fn read(pixel: vec2u) -> Known {
-    let index = pixel.y * frame.march_width + pixel.x;
+    let index = pixel.y * dispatch.march_width + pixel.x;
     let value = clouds[index];
     let depth = cloud_depth[index];
     let opacity = depth_weight(value.a, depth);
@@ -77,7 +77,7 @@ fn read(pixel: vec2u) -> Known {
 }
 
 fn scene_at(pixel: vec2u) -> f32 {
-    return scene_distance(marched_pixel(vec2u(pixel.x, frame.sheet_row + pixel.y)));
+    return scene_distance(marched_pixel(vec2u(pixel.x, dispatch.sheet_row + pixel.y)));
 }
 
 fn mixed(a: Known, b: Known, share: f32) -> Known {
@@ -107,11 +107,11 @@ fn joined(a: Looks, b: Looks) -> Looks {
 }
 
 fn settle(pixel: vec2u, around: Looks, between: Known) {
-    let index = pixel.y * frame.march_width + pixel.x;
+    let index = pixel.y * dispatch.march_width + pixel.x;
     // Rays that the user's scene ends say nothing of what lies behind it: each ray beside it is marched, and all of it.
     let open = min(around.scene, scene_at(pixel)) >= NO_SCENE;
     cloud_span[index] = select(vec2f(0.0, 1e30), around.span, open);
-    if contrast(around.light, around.transmittance) > quality.contrast || !open {
+    if contrast(around.light, around.transmittance) > params.quality.contrast || !open {
         active_rays[atomicAdd(&ray_count, 1u)] = index;
     } else {
         let distance = between.distance;

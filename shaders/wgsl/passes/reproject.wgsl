@@ -70,7 +70,7 @@ const MARCHED = 2u;
 
 @compute @workgroup_size(8, 8)
 fn predict(@builtin(global_invocation_id) id: vec3u) {
-    if id.x >= frame.march_width || id.y >= frame.sheet_rows {
+    if id.x >= dispatch.march_width || id.y >= dispatch.sheet_rows {
         return;
     }
     let at = vec2i(id.xy);
@@ -79,19 +79,19 @@ fn predict(@builtin(global_invocation_id) id: vec3u) {
     past.ray_distance = fresh_depth[cell_index(at)];
     // Where the cloud seen here was in the frame before. Where no cloud is near, the sky stands still.
     let centre = pixel_place(vec2f(at * STRIDE) + 0.5 * f32(STRIDE));
-    let away = select(frame.far_distance, past.distance, past.distance >= 0.0);
+    let away = select(frame.view.far_distance, past.distance, past.distance >= 0.0);
     let direction = view_direction(centre).xyz;
-    let way = frame.eye_motion - frame.cloud_motion;
+    let way = frame.view.eye_motion - frame.view.cloud_motion;
     let was = previous_pixel(normalize(away * direction + way));
     past.approach = dot(way, direction);
     past.width = pixel_width(direction) * f32(spacing());
-    let sun = acos(clamp(dot(direction, frame.sun_direction), -1.0, 1.0));
-    let sun_before = acos(clamp(dot(normalize(away * direction + way), frame.previous_sun), -1.0, 1.0));
+    let sun = acos(clamp(dot(direction, frame.sky.sun_direction), -1.0, 1.0));
+    let sun_before = acos(clamp(dot(normalize(away * direction + way), frame.sky.previous_sun), -1.0, 1.0));
     let glare = GLARE_SLOPE * abs(sun - sun_before) / (sun + GLARE_WIDTH);
     past.glare = select(glare, UNKNOWN, sun < SPARK + f32(STRIDE) * past.width);
     // What stands still is where it was, to the bit: a narrow view, a pole of a panorama or a wide picture turn the
     // rounding of a direction into a good part of a pixel.
-    let motion = select(shortest_way(was.xy - centre) / f32(spacing()), vec2f(0.0), frame.moving == 0u);
+    let motion = select(shortest_way(was.xy - centre) / f32(spacing()), vec2f(0.0), frame.view.moving == 0u);
     // What has moved by whole pixels reads them, exactly.
     past.motion = select(motion, round(motion), abs(motion - round(motion)) < vec2f(1e-3));
 
@@ -112,7 +112,7 @@ fn predict(@builtin(global_invocation_id) id: vec3u) {
     let cubic = a.cubic[0] * down.x + b.cubic[0] * down.y + c.cubic[0] * down.z + d.cubic[0] * down.w;
     let from_history = limited(cubic, mix(b.linear[0], c.linear[0], f.y), b, c, 0u);
     past.predicted = select(fresh[cell_index(at)], from_history, inside);
-    let seen = (was.z > 0.0 || frame.moving == 0u) && was_known(shifted) && is_finite4(past.predicted);
+    let seen = (was.z > 0.0 || frame.view.moving == 0u) && was_known(shifted) && is_finite4(past.predicted);
     let length = history_length[pixel_index(shifted)];
     past.source = select(UNSEEN, select(GUESSED, MARCHED, inside && length == ROUND), seen || !inside);
     cells[cell_index(at)] = past;
@@ -121,7 +121,7 @@ fn predict(@builtin(global_invocation_id) id: vec3u) {
 // Compares the new ray of a cell with what the history predicts, and those around.
 @compute @workgroup_size(8, 8)
 fn validate(@builtin(global_invocation_id) id: vec3u) {
-    if id.x >= frame.march_width || id.y >= frame.sheet_rows {
+    if id.x >= dispatch.march_width || id.y >= dispatch.sheet_rows {
         return;
     }
     let at = vec2i(id.xy);
@@ -197,16 +197,16 @@ struct Cell {
 
 @compute @workgroup_size(8, 8)
 fn reproject(@builtin(global_invocation_id) id: vec3u) {
-    if id.x >= frame.march_width || id.y * u32(STRIDE) >= frame.rows {
+    if id.x >= dispatch.march_width || id.y * u32(STRIDE) >= dispatch.rows {
         return;
     }
-    let at = vec2i(vec2u(id.x, frame.first_row / u32(STRIDE) + id.y));
+    let at = vec2i(vec2u(id.x, dispatch.first_row / u32(STRIDE) + id.y));
     let cell = read_cell(at);
     let motion = cell.past.motion;
     // The frame before between pixel centres, by Catmull-Rom splines: linear interpolation, repeated every frame, would
     // blur. Four rows at a time make one.
     let corner = cell.corner + vec2i(floor(motion)) - 1;
-    let alone = SCENE && frame.moving > 0u && has_scene_edge(at, cell.corner, corner);
+    let alone = SCENE && frame.view.moving > 0u && has_scene_edge(at, cell.corner, corner);
     let f = fract(motion);
     let across = catmull_rom(f.x);
     let down = catmull_rom(f.y);
@@ -264,7 +264,7 @@ fn read_cell(at: vec2i) -> Cell {
         contrast(vec2f(least.w, most.w), vec2f(thickest.w, clearest.w)),
     );
     // Beyond the outermost rays there is nothing to interpolate.
-    let last = vec2i(vec2u(frame.march_width, frame.sheet_rows)) - 1;
+    let last = vec2i(vec2u(dispatch.march_width, dispatch.sheet_rows)) - 1;
     let wraps = CAMERA == EQUIRECT && !SPARSE;
     let outside = vec4<bool>(at.y == 0, at.y == last.y, at.x == 0 && !wraps, at.x == last.x && !wraps);
     cell.contrast = select(cell.contrast, vec4f(UNKNOWN), outside.xxyy | outside.zwzw);
@@ -274,7 +274,7 @@ fn read_cell(at: vec2i) -> Cell {
 
 // Contrast up to which a history is followed, and, below it, up to which there is interpolation.
 fn tolerance(past: CellPast) -> f32 {
-    return clamp(quality.contrast, LEAST_TOLERANCE, MOST_TOLERANCE) * narrowness(past);
+    return clamp(params.quality.contrast, LEAST_TOLERANCE, MOST_TOLERANCE) * narrowness(past);
 }
 
 fn narrowness(past: CellPast) -> f32 {
@@ -348,7 +348,7 @@ fn begin(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= size) {
         return;
     }
-    let on_lattice = (id.xy % frame.lattice == vec2u(0u)) | (id.xy == size - 1u);
+    let on_lattice = (id.xy % dispatch.lattice == vec2u(0u)) | (id.xy == size - 1u);
     followed[id.y * size.x + id.x] = select(ROUND - 1u, ROUND, all(on_lattice));
 }
 
@@ -359,8 +359,8 @@ fn rescale(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= size) {
         return;
     }
-    let scale = vec2f(vec2u(frame.previous_width, frame.previous_height)) / vec2f(vec2u(frame.width, frame.height));
-    let at = (pixel_place(vec2f(id.xy) + 0.5) * scale - 0.5) / f32(frame.previous_spacing);
+    let scale = vec2f(vec2u(frame.view.previous_width, frame.view.previous_height)) / vec2f(vec2u(frame.view.width, frame.view.height));
+    let at = (pixel_place(vec2f(id.xy) + 0.5) * scale - 0.5) / f32(frame.view.previous_spacing);
     let corner = vec2i(floor(at));
     let f = at - floor(at);
     let above = mix(history[previous_index(corner)], history[previous_index(corner + vec2i(1, 0))], f.x);
@@ -371,11 +371,11 @@ fn rescale(@builtin(global_invocation_id) id: vec3u) {
     cloud_depth[index] = history_depth[nearest];
     // A ray of its own, or as many guesses.
     let past = history_length[nearest];
-    followed[index] = select(min(past, ROUND - 1u), ROUND, past == frame.previous_round);
+    followed[index] = select(min(past, ROUND - 1u), ROUND, past == frame.view.previous_round);
 }
 
 fn previous_index(pixel: vec2i) -> u32 {
-    let size = known_size_by(vec2u(frame.previous_width, frame.previous_height), frame.previous_spacing);
+    let size = known_size_by(vec2u(frame.view.previous_width, frame.view.previous_height), frame.view.previous_spacing);
     let inside = vec2u(clamp(pixel, vec2i(0), vec2i(size) - 1));
     return inside.y * size.x + inside.x;
 }
@@ -387,7 +387,7 @@ fn pixel_place(place: vec2f) -> vec2f {
 
 // The pixel of a cell that has been marched.
 fn own_pixel() -> vec2i {
-    return vec2i(vec2u(frame.subpixel_x, frame.subpixel_y) / spacing());
+    return vec2i(vec2u(dispatch.subpixel_x, dispatch.subpixel_y) / spacing());
 }
 
 // Whether the frame before has a pixel.
@@ -418,7 +418,7 @@ fn fill(cell: Cell, place: vec2i, old: vec4f, alone: bool) {
     let depth = history_depth[pixel_index(shifted)];
     let error = select(quarter(cell.error, place), quarter(cell.own_error, place), length == ROUND);
     let contrast = quarter(cell.contrast, place);
-    let least = INTERPOLATED * quality.contrast * narrowness(cell.past);
+    let least = INTERPOLATED * params.quality.contrast * narrowness(cell.past);
     let alike = contrast <= least;
     let ghost = alike && error > max(GHOST * contrast, LEAST_GHOST);
     let seen = was_known(shifted) && is_finite4(old);
@@ -454,16 +454,16 @@ fn fill(cell: Cell, place: vec2i, old: vec4f, alone: bool) {
 
 // By how many pixels a cloud at a depth has moved otherwise than the cell, at most.
 fn parallax(cell: Cell, depth: f32) -> f32 {
-    let far = vec2f(frame.far_distance);
+    let far = vec2f(frame.view.far_distance);
     let distances = vec2f(depth, cell.past.distance);
     let inverse = 1.0 / max(select(far, distances, distances >= vec2f(0.0)), vec2f(1.0));
-    let way = length(frame.eye_motion - frame.cloud_motion);
+    let way = length(frame.view.eye_motion - frame.view.cloud_motion);
     return way * abs(inverse.x - inverse.y) / cell.past.width;
 }
 
 // Whether the scene has an edge among the pixels of a cell, the marched ones around it, and those of the past that are read.
 fn has_scene_edge(at: vec2i, corner: vec2i, past_corner: vec2i) -> bool {
-    let size = vec2i(vec2u(frame.march_width, frame.sheet_rows));
+    let size = vec2i(vec2u(dispatch.march_width, dispatch.sheet_rows));
     var near = NO_SCENE;
     var far = 0.0;
     var i = 0;
@@ -531,7 +531,7 @@ fn nearest_cloud(cell: vec2i) -> f32 {
 }
 
 fn cell_index(cell: vec2i) -> u32 {
-    let size = vec2i(vec2u(frame.march_width, frame.sheet_rows));
+    let size = vec2i(vec2u(dispatch.march_width, dispatch.sheet_rows));
     var inside = clamp(cell, vec2i(0), size - 1);
     if CAMERA == EQUIRECT && !SPARSE {
         inside.x = (cell.x + size.x) % size.x;

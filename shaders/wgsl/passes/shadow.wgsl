@@ -18,18 +18,18 @@ const DARK = 7.0;
 
 @compute @workgroup_size(8, 8)
 fn shadow_map(@builtin(global_invocation_id) id: vec3u) {
-    let texel = vec2u(id.x, frame.first_row + id.y);
-    if id.x >= frame.width || id.y >= frame.rows {
+    let texel = vec2u(id.x, dispatch.first_row + id.y);
+    if id.x >= frame.view.width || id.y >= dispatch.rows {
         return;
     }
     // From the middle, which is where the eye stands: east and north.
-    let size = vec2f(f32(frame.width), f32(frame.height));
-    let at = (vec2f(texel) + 0.5 - 0.5 * size) * vec2f(1.0, -1.0) * frame.shadow_texel;
+    let size = vec2f(f32(frame.view.width), f32(frame.view.height));
+    let at = (vec2f(texel) + 0.5 - 0.5 * size) * vec2f(1.0, -1.0) * frame.sky.shadow_texel;
     let p = vec3f(at, 0.0);
-    let hidden = hit_ground_from(p, frame.sun_direction).enters;
-    let fine = select(2.0 * finest_feature(), frame.voxel, VOLUME);
-    let depth = cloud_depth_to_sun(p, fine, MAP_STEPS).x + high_depth_from(p, frame.sun_direction);
-    shadow_out[texel.y * frame.width + id.x] = select(exp(-depth), 0.0, hidden);
+    let hidden = hit_ground_from(p, frame.sky.sun_direction).enters;
+    let fine = select(2.0 * finest_feature(), frame.sky.voxel, VOLUME);
+    let depth = cloud_depth_to_sun(p, fine, MAP_STEPS).x + high_depth_from(p, frame.sky.sun_direction);
+    shadow_out[texel.y * frame.view.width + id.x] = select(exp(-depth), 0.0, hidden);
 }
 
 @compute @workgroup_size(8, 8)
@@ -45,9 +45,9 @@ fn shadow_ground(
     let level = id.y / SHADOW_SIDE;
     let texel = shadow_texel(level);
     let at = (vec2f(vec2u(id.x, id.y % SHADOW_SIDE)) + 0.5 - 0.5 * f32(SHADOW_SIDE)) * texel;
-    let fine = select(max(2.0 * finest_feature(), texel), max(frame.voxel, 0.5 * texel), VOLUME);
+    let fine = select(max(2.0 * finest_feature(), texel), max(frame.sky.voxel, 0.5 * texel), VOLUME);
     // Of texels that are wider than clouds the mean of several places, in a low-discrepancy sequence (R2).
-    let width = texel / frame.leap_scale;
+    let width = texel / frame.sky.leap_scale;
     let places = select(clamp(ceil(width * width), 1.0, MOST_PLACES), 1.0, VOLUME);
     var sum = vec4f(0.0);
     var k = 0.0;
@@ -107,7 +107,7 @@ fn shadow_mean(@builtin(local_invocation_id) id: vec3u) {
 // of their height, from the far end on, so that what is behind `DARK` is dark in all of them. In steps of `fine` metres, or
 // longer ones.
 fn cloud_depth_to_sun(p: vec3f, fine: f32, most: f32) -> vec4f {
-    let s = cloud_stretches_from(p, frame.sun_direction);
+    let s = cloud_stretches_from(p, frame.sky.sun_direction);
     let length = s.first + s.second;
     let count = clamp(ceil(length / fine), FEWEST, most);
     let step = length / count;
@@ -118,7 +118,7 @@ fn cloud_depth_to_sun(p: vec3f, fine: f32, most: f32) -> vec4f {
         var column = Column();
         var q = vec3f(0.0);
         loop {
-            let at = p + stretch_distance(s, (count - i - 0.5) * step) * frame.sun_direction;
+            let at = p + stretch_distance(s, (count - i - 0.5) * step) * frame.sky.sun_direction;
             let found = cloud_column(at, altitude_at(at));
             i += 1.0;
             // Left in two places, with what was found or with nothing: of what is the same wherever a loop is left, lavapipe
@@ -133,7 +133,7 @@ fn cloud_depth_to_sun(p: vec3f, fine: f32, most: f32) -> vec4f {
             }
         }
         let above = vec4f(height_among_clouds(q, altitude_at(q))) >= vec4f(-1e30, 0.25, 0.5, 0.75);
-        let here = frame.extinction * step * cloud_density(column, cloud_shape(column), 0.0);
+        let here = frame.sky.extinction * step * cloud_density(column, cloud_shape(column), 0.0);
         depth += select(vec4f(0.0), vec4f(here), above);
         if i >= count || depth.x > DARK {
             break;

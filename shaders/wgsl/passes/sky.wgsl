@@ -19,7 +19,7 @@ fn sky_map_bake(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let direction = texel_direction(vec2f(id.xy), vec2f(size));
-    let radiance = min(frame.sky_scale * air_radiance(direction) / frame.sky_unit, vec3f(65504.0));
+    let radiance = min(frame.sky.sky_scale * air_radiance(direction) / frame.sky.sky_unit, vec3f(65504.0));
     textureStore(map_out, id.xy, vec4f(radiance, 1.0));
 }
 
@@ -27,23 +27,23 @@ fn sky_map_bake(@builtin(global_invocation_id) id: vec3u) {
 fn texel_direction(texel: vec2f, size: vec2f) -> vec3f {
     let azimuth = texel.x / (size.x - 1.0) * PI;
     let v = (texel.y + 0.5) / size.y;
-    let above = (1.0 - 2.0 * v) * (1.0 - 2.0 * v) * (0.5 * PI + frame.horizon_dip);
-    let below = (2.0 * v - 1.0) * (2.0 * v - 1.0) * (0.5 * PI - frame.horizon_dip);
-    let elevation = select(-below, above, v < 0.5) - frame.horizon_dip;
+    let above = (1.0 - 2.0 * v) * (1.0 - 2.0 * v) * (0.5 * PI + frame.view.horizon_dip);
+    let below = (2.0 * v - 1.0) * (2.0 * v - 1.0) * (0.5 * PI - frame.view.horizon_dip);
+    let elevation = select(-below, above, v < 0.5) - frame.view.horizon_dip;
     return sky_direction(azimuth, elevation);
 }
 
 // The direction at an azimuth from the sun and an angle above the horizontal plane.
 fn sky_direction(azimuth: f32, elevation: f32) -> vec3f {
-    var toward = frame.sun_direction - dot(frame.sun_direction, frame.zenith) * frame.zenith;
+    var toward = frame.sky.sun_direction - dot(frame.sky.sun_direction, frame.view.zenith) * frame.view.zenith;
     if length(toward) < 1e-4 {
         // The sun at the zenith: all azimuths are alike.
-        toward = cross(frame.zenith, vec3f(0.6, 0.8, 0.0));
+        toward = cross(frame.view.zenith, vec3f(0.6, 0.8, 0.0));
     }
     toward = normalize(toward);
-    let side = cross(frame.zenith, toward);
+    let side = cross(frame.view.zenith, toward);
     let level = cos(azimuth) * toward + sin(azimuth) * side;
-    return cos(elevation) * level + sin(elevation) * frame.zenith;
+    return cos(elevation) * level + sin(elevation) * frame.view.zenith;
 }
 
 // Radiance of the air along a direction from the camera, up to the ground or to space, and of the night behind it.
@@ -53,12 +53,12 @@ fn air_radiance(direction: vec3f) -> vec3f {
         return vec3f(0.0);
     }
     // By squares from the lowest point of the ray, where the air is densest.
-    let b = frame.centre_distance * dot(frame.zenith, direction);
+    let b = frame.view.centre_distance * dot(frame.view.zenith, direction);
     let lowest = clamp(-b - way.start, 0.0, way.length);
     let from_s = -sqrt(lowest);
     let to_s = sqrt(way.length - lowest);
     var light = AirLight(vec3f(0.0), vec3f(0.0));
-    let sun = dot(frame.zenith, frame.sun_direction);
+    let sun = dot(frame.view.zenith, frame.sky.sun_direction);
     let steps = round(mix(STEPS_LOW, STEPS_HIGH, saturate((sun - SUN_LOW) / (SUN_HIGH - SUN_LOW))));
     for (var i = 0u; i < u32(steps); i++) {
         let s = mix(vec3f(from_s), vec3f(to_s), (f32(i) + vec3f(0.0, 0.5, 1.0)) / steps);
@@ -78,9 +78,9 @@ struct AirLight {
 fn air_step(before: AirLight, direction: vec3f, t: f32, step: f32) -> AirLight {
     let p = t * direction;
     let h = altitude_at(p);
-    let mu_sun = cos_zenith_at(p, frame.sun_direction);
+    let mu_sun = cos_zenith_at(p, frame.sky.sun_direction);
     let parts = air_parts(h);
-    let one_minus_cosine = one_minus_cos(direction, frame.sun_direction);
+    let one_minus_cosine = one_minus_cos(direction, frame.sky.sun_direction);
     let once = air_scattering_toward(parts, one_minus_cosine) * sunlight(h, mu_sun);
     let again = scattered_again(parts, air_scattered(h, mu_sun), mu_sun, cos_zenith_at(p, direction), 1.0 - one_minus_cosine);
     let source = once + again;
@@ -126,7 +126,7 @@ fn air_share_bake(@builtin(global_invocation_id) id: vec3u) {
 @compute @workgroup_size(1)
 fn sky_light_bake() {
     let middle = 0.5 * (params.clouds.base + params.clouds.top);
-    let mu = dot(frame.zenith, frame.sun_direction);
+    let mu = dot(frame.view.zenith, frame.sky.sun_direction);
     sky_light[0] = vec4f(light_from_above(middle, mu), 1.0);
     sky_light[1] = vec4f(light_from_below(middle, mu), 1.0);
     sky_light[2] = vec4f(sun_irradiance(middle, mu), 1.0);

@@ -31,31 +31,32 @@ pub(crate) struct Beams {
 
 /// Texels for a picture.
 fn size(frame: &Frame) -> [u32; 3] {
-    let pixel = frame.marched_angle() / frame.stride as f32;
+    let pixel = frame.marched_angle() / frame.dispatch.stride as f32;
     // At least a pixel apart.
     let along = |pixels: u32| (pixels.min((pixels as f32 * pixel / ANGLE) as u32) + 1).clamp(2, MOST);
-    [along(frame.width), along(frame.height), SLICES]
+    [along(frame.view.width), along(frame.view.height), SLICES]
 }
 
 impl Beams {
     pub fn update(&mut self, rec: &mut Recorder<'_>, inputs: &Inputs<'_>) -> Result<()> {
         let Inputs { params, frame, eye, .. } = *inputs;
-        if frame.beams == 0 {
+        if !frame.beams {
             return Ok(());
         }
         let size = size(frame);
-        let axes = [frame.right, frame.up, frame.forward];
-        let scales = [frame.tan_half_fov, frame.half_fov, frame.sky_scale];
+        let axes = [frame.view.right, frame.view.up, frame.view.forward];
+        let scales = [frame.view.tan_half_fov, frame.view.half_fov, frame.sky.sky_scale];
         let from = near(eye, params, STEP);
-        let place = DVec2::from_array(frame.shadow_eye.map(f64::from)) + from.truncate() - eye.truncate();
+        let place = DVec2::from_array(frame.sky.shadow_eye.map(f64::from)) + from.truncate() - eye.truncate();
         let place = ((place / STEP).round() * STEP).to_array();
         let (sun, air, shadows) = (params.sun.clone(), params.atmosphere.clone(), shadow::key(inputs));
         let key = (size, axes, scales, sun, air, shadows, from.to_array(), place);
         let volume = self.lut.update(rec, key, |rec| {
             let volume = view(&rec.gpu.texture_3d("beams", size));
-            let mut there = Frame { shadow_eye: place.map(|v| v as f32), ..frame.clone() };
+            let mut there = frame.clone();
+            there.sky.shadow_eye = place.map(|v| v as f32);
             there.set_planet(from, params);
-            let bindings = vec![("frame", there.block(rec.gpu)), ("volume_out", (&volume).into())];
+            let bindings = [there.bindings(rec.gpu).as_slice(), &[("volume_out", (&volume).into())]].concat();
             rec.dispatch(("beams", "beams_bake"), bindings, [size[0], size[1], 1]);
             Ok(volume)
         })?;

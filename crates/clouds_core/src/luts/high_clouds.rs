@@ -30,7 +30,8 @@ impl HighClouds {
             return Ok(());
         }
         let high = &params.high_clouds;
-        let updates = [frame.high_age, frame.high_age_small, frame.high_update, frame.high_update_small];
+        let updates =
+            [frame.sky.high_age, frame.sky.high_age_small, frame.sky.high_update, frame.sky.high_update_small];
         let size = high.texture_size;
         let key = (high.seed, high.octaves, high.stretch, high.r#type, size, updates);
         let map = self.lut.update(rec, key, |rec| {

@@ -30,7 +30,6 @@ use crate::kernel::{Binding, Name, Specialization};
 use crate::params::{self, Params, Quality};
 use crate::plan::Plan;
 use crate::recorder::{Recorder, Token};
-use crate::schema::{self, Block as _};
 use crate::shader::Linked;
 use crate::shot::Shot;
 use crate::specialization;
@@ -127,14 +126,8 @@ impl Luts {
 
     /// Binds the uniform blocks and the LUTs of a picture, after baking what has changed.
     pub fn update(&mut self, rec: &mut Recorder<'_>, inputs: &Inputs<'_>) -> Result<()> {
-        let mut quality = vec![0; schema::size(Quality::FIELDS) / 4];
-        inputs.quality.write(&mut quality);
-        rec.bind([
-            ("params", params_block(inputs.params)),
-            ("frame", inputs.frame.block(rec.gpu)),
-            ("quality", Binding::block(&quality)),
-            ("blue_noise", (&self.blue_noise).into()),
-        ]);
+        rec.bind([("params", params_block(inputs.params, inputs.quality)), ("blue_noise", (&self.blue_noise).into())]);
+        rec.bind(inputs.frame.bindings(rec.gpu));
         rec.specialize(specialization::of_bakes());
         self.noise.update(rec, inputs)?; // once for a seed and a finer detail
         self.weather.update(rec, inputs)?; // when its block or the mixture changes
@@ -154,15 +147,16 @@ impl Luts {
 
     /// The weather map alone.
     pub fn weather_map(&mut self, rec: &mut Recorder<'_>, params: &Params, frame: &Frame) -> Result<wgpu::Texture> {
-        rec.bind([("params", params_block(params)), ("frame", frame.block(rec.gpu))]);
+        rec.bind([("params", params_block(params, &Quality::default()))]);
+        rec.bind(frame.bindings(rec.gpu));
         rec.specialize(specialization::of_bakes());
         self.weather.texture(rec, params)
     }
 }
 
 /// The uniform block of parameters.
-pub(crate) fn params_block(params: &Params) -> Binding {
-    Binding::block(&params::uniform(params))
+pub(crate) fn params_block(params: &Params, quality: &Quality) -> Binding {
+    Binding::block(&params::uniform(params, quality))
 }
 
 pub(crate) fn view(texture: &wgpu::Texture) -> wgpu::TextureView {
@@ -172,7 +166,7 @@ pub(crate) fn view(texture: &wgpu::Texture) -> wgpu::TextureView {
 /// Fills a flat texture with a kernel.
 fn bake_map(rec: &mut Recorder<'_>, name: Name, params: Option<&Params>, texture: &wgpu::Texture) {
     let mut bindings = vec![("map_out", (&view(texture)).into())];
-    bindings.extend(params.map(|params| ("params", params_block(params))));
+    bindings.extend(params.map(|params| ("params", params_block(params, &Quality::default()))));
     rec.dispatch(name, bindings, [texture.width(), texture.height(), 1]);
 }
 

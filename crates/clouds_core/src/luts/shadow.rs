@@ -11,6 +11,7 @@ use crate::error::Result;
 use crate::frame::Frame;
 use crate::params::Params;
 use crate::recorder::Recorder;
+use crate::uniforms::Dispatch;
 use crate::wind::Carried;
 
 /// Texels across a level, and levels (as in ground_shadow.wgsl).
@@ -32,7 +33,7 @@ pub(crate) type Key = (Casters, (f32, Grid), [i64; 3], f32);
 pub(crate) fn key(inputs: &Inputs<'_>) -> Key {
     let Inputs { params, frame, eye, time, .. } = *inputs;
     let planet = (params.atmosphere.planet_radius, Grid(params.volume.clone()));
-    (casters(params), planet, origin(eye, params, time).steps, frame.shadow_texel)
+    (casters(params), planet, origin(eye, params, time).steps, frame.sky.shadow_texel)
 }
 
 /// The levels on the GPU.
@@ -63,7 +64,7 @@ pub(crate) fn texel(altitude: f32) -> f32 {
 
 /// Whether a picture reads them.
 fn wanted(frame: &Frame) -> bool {
-    frame.beams > 0 || frame.ground_shadow > 0 && frame.cloudless == 0
+    frame.beams || frame.ground_shadow && !frame.cloudless
 }
 
 impl GroundShadow {
@@ -77,12 +78,13 @@ impl GroundShadow {
             let size = [SIDE, SIDE * LEVELS, 1];
             let [single, mean, levels] = [("", size), ("ground_shadow_mean", [1; 3]), ("ground_shadow", size)]
                 .map(|(label, size)| view(&rec.gpu.texture(label, size, 1)));
-            let there = Frame::new(&Camera::equirect(origin.place.extend(0.0))?, params, origin.time, [1, 1]);
-            let there = Frame { shadow_texel: frame.shadow_texel, ..there }.block(rec.gpu);
+            let mut there = Frame::new(&Camera::equirect(origin.place.extend(0.0))?, params, origin.time, [1, 1]);
+            there.sky.shadow_texel = frame.sky.shadow_texel;
+            let there = there.bindings(rec.gpu);
             let (made, of_all) = (("ground_shadow", (&single).into()), ("ground_shadow_mean", (&mean).into()));
             let mut bake = |entry, reads: &[_], out: &wgpu::TextureView, size| {
-                let ours = [("frame", there.clone()), ("map_out", out.into())];
-                rec.dispatch(("shadow", entry), [&ours, reads].concat(), size);
+                let ours = [there.as_slice(), &[("map_out", out.into())], reads];
+                rec.dispatch(("shadow", entry), ours.concat(), size);
             };
             bake("shadow_ground", &[], &single, size);
             bake("shadow_mean", std::slice::from_ref(&made), &mean, [SIDE, 1, 1]);
@@ -96,9 +98,9 @@ impl GroundShadow {
 
 /// The user's map, of `size` by `size` texels, into `out`.
 pub(crate) fn map(rec: &mut Recorder<'_>, frame: &Frame, size: u32, out: &wgpu::Buffer) {
-    let bindings = vec![("shadow_out", out.into())];
+    let bindings = [&[("shadow_out", out.into())], frame.bindings(rec.gpu).as_slice()].concat();
     let gpu = rec.gpu;
     rec.dispatch_rows(("shadow", "shadow_map"), &bindings, [size, size], |rows| {
-        Frame { first_row: rows.start, rows: rows.len() as u32, ..frame.clone() }.block(gpu)
+        Dispatch { first_row: rows.start, rows: rows.len() as u32, ..frame.dispatch.clone() }.binding(gpu).1
     });
 }

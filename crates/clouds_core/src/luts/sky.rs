@@ -56,7 +56,7 @@ impl Sky {
         let sun = params::Sun { visible: true, ..params.sun.clone() };
         let key = (sun, transmittance::air(params), params.atmosphere.night, from.to_array(), layers);
         let (map, share, light) = self.lut.update(rec, key, |rec| {
-            let frame = Frame::new(&Camera::equirect(from)?, params, 0.0, [1, 1]).block(rec.gpu);
+            let frame = Frame::new(&Camera::equirect(from)?, params, 0.0, [1, 1]).bindings(rec.gpu);
             let map = view(&rec.gpu.texture("sky", SIZE, 1));
             let share = view(&rec.gpu.texture_3d("air_share", SHARE_SIZE));
             let light = rec.gpu.buffer("sky_light", 64);
@@ -67,7 +67,7 @@ impl Sky {
                 ("sky_light_bake", ("sky_light", (&light).into()), [1; 3]),
             ];
             for (entry, out, size) in bakes {
-                rec.dispatch(("sky", entry), vec![("frame", frame.clone()), out], size);
+                rec.dispatch(("sky", entry), [frame.as_slice(), &[out]].concat(), size);
             }
             Ok((map, share, light))
         })?;

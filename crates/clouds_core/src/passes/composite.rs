@@ -7,6 +7,7 @@ use crate::gpu::Gpu;
 use crate::kernel::Bindings;
 use crate::params::{Params, Quality};
 use crate::recorder::Recorder;
+use crate::uniforms::Dispatch;
 
 /// Pixels of a cell in each direction (as in lattice.wgsl).
 pub(crate) const TILE: u32 = COARSEST;
@@ -68,8 +69,8 @@ fn corners(size: [u32; 2]) -> [u32; 2] {
 /// Whether what is behind the clouds is worked out by cells: where clouds are marched so, and cells as narrow as theirs. The
 /// high clouds are a single layer then, as they are from below.
 pub(crate) fn by_cells(frame: &Frame, quality: &Quality) -> bool {
-    let single = frame.high_clouds == 0 || frame.power_high <= 0.0;
-    quality.contrast > 0.0 && single && TILE as f32 * frame.marched_angle() / frame.stride as f32 <= WIDEST
+    let single = !frame.high_clouds || frame.view.power_high <= 0.0;
+    quality.contrast > 0.0 && single && TILE as f32 * frame.marched_angle() / frame.dispatch.stride as f32 <= WIDEST
 }
 
 /// Composes the sheet of `frame`: cells, then the pixels of those that are not smooth, or all of them; then those in which a disc
@@ -77,11 +78,11 @@ pub(crate) fn by_cells(frame: &Frame, quality: &Quality) -> bool {
 pub(crate) fn record(rec: &mut Recorder<'_>, frame: &Frame, params: &Params, parts: &Parts<'_>, by_cells: bool) {
     let gpu = rec.gpu;
     let Parts { marched, backdrop, refined, out } = parts;
-    let frame = Frame { first_row: frame.sheet_row, ..frame.clone() };
+    let whole = Dispatch { first_row: frame.dispatch.sheet_row, ..frame.dispatch.clone() };
     let ours = [marched.bindings(), out.bindings()].concat();
     if by_cells {
-        let block = vec![("frame", frame.block(gpu))];
-        let size = [frame.width, frame.rows];
+        let block = vec![whole.binding(gpu)];
+        let size = [frame.view.width, frame.dispatch.rows];
         let [columns, rows] = corners(size);
         rec.dispatch(("composite", "backdrop"), [block.clone(), backdrop.bindings()].concat(), [columns, rows, 1]);
         let [columns, rows] = size.map(|pixels| pixels.div_ceil(TILE));
@@ -91,18 +92,18 @@ pub(crate) fn record(rec: &mut Recorder<'_>, frame: &Frame, params: &Params, par
         rec.dispatch(("composite", "composite_cells"), cells, [columns, rows, 1]);
         let list = refined.list(columns * rows, TILE * TILE, ROUGH);
         rec.dispatch_list(("composite", "composite_list"), &ours, &list, |first_ray| {
-            Frame { first_ray, ..frame.clone() }.block(gpu)
+            Dispatch { first_ray, ..whole.clone() }.binding(gpu).1
         });
     } else {
-        rec.dispatch_rows(("composite", "composite"), &ours, [frame.width, frame.rows], |rows| {
-            let (first_row, rows) = (frame.sheet_row + rows.start, rows.len() as u32);
-            Frame { first_row, rows, ..frame.clone() }.block(gpu)
+        rec.dispatch_rows(("composite", "composite"), &ours, [frame.view.width, frame.dispatch.rows], |rows| {
+            let (first_row, rows) = (frame.dispatch.sheet_row + rows.start, rows.len() as u32);
+            Dispatch { first_row, rows, ..whole.clone() }.binding(gpu).1
         });
     }
     for [first_column, first_row, columns, rows] in frame.disc_pixels(params) {
-        let block = Frame { first_column, first_row, columns, rows, ..frame.clone() }.block(gpu);
+        let pixels = Dispatch { first_column, first_row, columns, rows, ..whole.clone() };
         let usual = rec.specialize_with(&[("DISCS", 1.0)]);
-        let bindings = [vec![("frame", block)], ours.clone()].concat();
+        let bindings = [vec![pixels.binding(gpu)], ours.clone()].concat();
         rec.dispatch(("composite", "composite_discs"), bindings, [columns, rows, 1]);
         rec.specialize(usual);
     }

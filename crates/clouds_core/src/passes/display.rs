@@ -7,6 +7,7 @@ use crate::frame::Frame;
 use crate::gpu::Gpu;
 use crate::kernel::Bindings;
 use crate::recorder::Recorder;
+use crate::uniforms::Dispatch;
 
 /// A texture of the device that a window shows: 8-bit pixels, encoded for a display.
 pub struct Screen {
@@ -82,7 +83,7 @@ impl Screen {
 
 /// Shows a picture.
 pub(crate) fn record(rec: &mut Recorder<'_>, frame: &Frame, composed: &Composed, screen: &Screen) {
-    let block = Frame { first_row: 0, rows: frame.height, ..frame.clone() }.block(rec.gpu);
-    let bindings = [vec![("frame", block)], composed.bindings(), screen.bindings()].concat();
-    rec.dispatch(("display", "display"), bindings, [frame.width, frame.height, 1]);
+    let block = Dispatch { first_row: 0, rows: frame.view.height, ..frame.dispatch.clone() }.binding(rec.gpu);
+    let bindings = [vec![block], composed.bindings(), screen.bindings()].concat();
+    rec.dispatch(("display", "display"), bindings, [frame.view.width, frame.view.height, 1]);
 }

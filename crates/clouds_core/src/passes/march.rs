@@ -6,6 +6,7 @@ use crate::gpu::Gpu;
 use crate::kernel::Bindings;
 use crate::params::Quality;
 use crate::recorder::Recorder;
+use crate::uniforms::Dispatch;
 
 /// What the march makes of each pixel of a sheet or of a picture.
 pub(crate) struct Marched {
@@ -39,23 +40,24 @@ impl Marched {
 pub(crate) fn record(rec: &mut Recorder<'_>, frame: &Frame, quality: &Quality, refined: &Refined, out: &Marched) {
     let gpu = rec.gpu;
     if !refine::is_needed(frame, quality) {
-        let size = [frame.march_width, frame.sheet_rows];
+        let size = [frame.dispatch.march_width, frame.dispatch.sheet_rows];
         return rec.dispatch_rows(("march", "march"), &out.bindings(), size, |rows| {
-            let (first_row, rows) = (frame.sheet_row + rows.start, rows.len() as u32);
-            Frame { first_row, rows, ..frame.clone() }.block(gpu)
+            let (first_row, rows) = (frame.dispatch.sheet_row + rows.start, rows.len() as u32);
+            Dispatch { first_row, rows, ..frame.dispatch.clone() }.binding(gpu).1
         });
     }
-    let mut frame = Frame { lattice: refine::coarsest(frame, quality), ..frame.clone() };
+    let mut frame = frame.clone();
+    frame.dispatch.lattice = refine::coarsest(&frame, quality);
     refine::begin(rec, &frame, refined);
     let mut likely = 1.0;
     loop {
         list(rec, &frame, refine::pixels(&frame), likely, refined, out);
-        if frame.lattice == 1 {
+        if frame.dispatch.lattice == 1 {
             return;
         }
         refine::record(rec, &frame, refined, out);
-        frame.lattice /= 2;
-        frame.spans = 1;
+        frame.dispatch.lattice /= 2;
+        frame.dispatch.spans = 1;
         likely = REFINED;
     }
 }
@@ -68,6 +70,6 @@ pub(crate) fn list(rec: &mut Recorder<'_>, frame: &Frame, most: u32, likely: f64
     let gpu = rec.gpu;
     let bindings = [out.bindings(), refined.bindings()].concat();
     rec.dispatch_list(("march", "march_list"), &bindings, &refined.list(most, 1, likely), |first_ray| {
-        Frame { first_ray, ..frame.clone() }.block(gpu)
+        Dispatch { first_ray, ..frame.dispatch.clone() }.binding(gpu).1
     });
 }

@@ -3,6 +3,7 @@
 use crate::error::Result;
 use crate::frame::Frame;
 use crate::recorder::{Recorder, Which};
+use crate::uniforms::Dispatch;
 
 /// Points in one dispatch: few enough that a march of each toward the sun stays far under a watchdog's second.
 pub(crate) const CHUNK: usize = 1 << 14;
@@ -20,8 +21,8 @@ pub(crate) fn run(
         let bytes = std::mem::size_of_val(chunk) as u64;
         let (given, answers) = (rec.gpu.buffer("points", bytes), rec.gpu.buffer("results", bytes));
         rec.gpu.queue.write_buffer(&given, 0, bytemuck::cast_slice(chunk));
-        let block = Frame { width: chunk.len() as u32, ..frame.clone() }.block(rec.gpu);
-        let bindings = vec![("frame", block), ("points", (&given).into()), ("results", (&answers).into())];
+        let block = Dispatch { columns: chunk.len() as u32, ..frame.dispatch.clone() }.binding(rec.gpu);
+        let bindings = vec![block, ("points", (&given).into()), ("results", (&answers).into())];
         rec.dispatch_kernel(kernel.clone(), bindings, [chunk.len() as u32, 1, 1]);
         rec.download(&answers, 0, bytes);
         let downloads = rec.flush()?;

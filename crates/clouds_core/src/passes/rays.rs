@@ -7,6 +7,7 @@ use crate::frame::Frame;
 use crate::gpu::Gpu;
 use crate::kernel::{Bindings, Name};
 use crate::recorder::Recorder;
+use crate::uniforms::Dispatch;
 
 /// Most turns of a dispatch: with the loops inside one, lavapipe's limit of 65,535 over a shader is far (hazard 21).
 const MOST_TURNS: u32 = 2048;
@@ -52,13 +53,13 @@ impl Rays {
     ) -> Result<()> {
         rec.clear(&self.state);
         let bindings = [outputs.as_slice(), &self.bindings(state)].concat();
-        let mut active: Vec<u32> = (0..frame.width * frame.rows).collect();
+        let mut active: Vec<u32> = (0..frame.view.width * frame.dispatch.rows).collect();
         let mut budget = 32;
         while !active.is_empty() {
             let count = active.len() as u32;
             rec.gpu.queue.write_buffer(&self.active, 0, bytemuck::cast_slice(&active));
-            let block = Frame { active_rays: count, budget, ..frame.clone() }.block(rec.gpu);
-            rec.dispatch(kernel, [&[("frame", block)], bindings.as_slice()].concat(), [count, 1, 1]);
+            let block = Dispatch { active_rays: count, budget, ..frame.dispatch.clone() }.binding(rec.gpu);
+            rec.dispatch(kernel, [&[block], bindings.as_slice()].concat(), [count, 1, 1]);
             rec.download(&self.progress, 0, 8 * u64::from(count));
             let started = Instant::now();
             let downloads = rec.flush()?;

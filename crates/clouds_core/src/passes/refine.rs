@@ -18,7 +18,7 @@ pub(crate) const WIDEST: f32 = 0.5 * PI / 180.0;
 /// Whether the pixels of that lattice are all that is ever marched: where no contrast is too large to interpolate, and no scene of the
 /// user's has edges. The rest of the picture is interpolated where it is composed (composite.wgsl), cell by cell.
 pub(crate) fn is_sparse(frame: &Frame, quality: &Quality) -> bool {
-    quality.contrast >= 1.0 && frame.scene == 0 && coarsest(frame, quality) == COARSEST
+    quality.contrast >= 1.0 && !frame.scene && coarsest(frame, quality) == COARSEST
 }
 
 impl Quality {
@@ -74,7 +74,7 @@ impl Refined {
 
 /// Columns and rows of the lattice of `frame`, of which the last column and row are a part.
 fn lattice(frame: &Frame) -> [u32; 2] {
-    [frame.march_width, frame.sheet_rows].map(|size| (size - 1).div_ceil(frame.lattice) + 1)
+    [frame.dispatch.march_width, frame.dispatch.sheet_rows].map(|size| (size - 1).div_ceil(frame.dispatch.lattice) + 1)
 }
 
 /// How many pixels it has.
@@ -84,7 +84,7 @@ pub(crate) fn pixels(frame: &Frame) -> u32 {
 
 /// Whether pixels between marched ones are looked at.
 pub(crate) fn is_needed(frame: &Frame, quality: &Quality) -> bool {
-    frame.sparse == 0 && coarsest(frame, quality) > 1
+    !frame.sparse && coarsest(frame, quality) > 1
 }
 
 /// The distance to begin with; 1 marches every pixel.
@@ -96,14 +96,14 @@ pub(crate) fn coarsest(frame: &Frame, quality: &Quality) -> u32 {
 /// Lists the pixels of the lattice of `frame`.
 pub(crate) fn begin(rec: &mut Recorder<'_>, frame: &Frame, refined: &Refined) {
     let [columns, rows] = lattice(frame);
-    let bindings = [vec![("frame", frame.block(rec.gpu))], refined.bindings()].concat();
+    let bindings = [vec![frame.dispatch.binding(rec.gpu)], refined.bindings()].concat();
     rec.clear(&refined.count);
     rec.dispatch(("refine", "list_lattice"), bindings, [columns, rows, 1]);
 }
 
-/// Halves the distance `frame.lattice` of the lattice: interpolates `out`, or lists pixels to be marched.
+/// Halves the distance `frame.dispatch.lattice` of the lattice: interpolates `out`, or lists pixels to be marched.
 pub(crate) fn record(rec: &mut Recorder<'_>, frame: &Frame, refined: &Refined, out: &Marched) {
-    let bindings = [vec![("frame", frame.block(rec.gpu))], out.bindings(), refined.bindings()].concat();
+    let bindings = [vec![frame.dispatch.binding(rec.gpu)], out.bindings(), refined.bindings()].concat();
     let [columns, rows] = lattice(frame);
     rec.dispatch(("refine", "refine"), bindings, [columns, rows, 1]);
 }

@@ -9,6 +9,7 @@ use crate::kernel::{Binding, Bindings};
 use crate::params::Quality;
 use crate::recorder::Recorder;
 use crate::scene_depth::SceneTextures;
+use crate::uniforms::Dispatch;
 
 /// One of this many pixels that are known is marched in a frame, in each direction.
 pub(crate) const fn stride(sparse: bool) -> u32 {
@@ -137,16 +138,17 @@ pub(crate) struct Buffers<'a> {
 pub(crate) fn record(rec: &mut Recorder<'_>, frame: &Frame, quality: &Quality, index: u32, buffers: &Buffers<'_>) {
     let gpu = rec.gpu;
     let Buffers { refined, current, before, now, .. } = *buffers;
-    let sparse = frame.sparse > 0;
+    let sparse = frame.sparse;
     let stride = stride(sparse);
-    let mut rays = Frame { stride: stride * refine::spacing(sparse), ..frame.clone() };
-    [rays.subpixel_x, rays.subpixel_y] = subpixel(index, sparse);
-    [rays.march_width, rays.sheet_rows] = cells(frame.known(), sparse);
+    let mut rays = frame.clone();
+    rays.dispatch.stride = stride * refine::spacing(sparse);
+    [rays.dispatch.subpixel_x, rays.dispatch.subpixel_y] = subpixel(index, sparse);
+    [rays.dispatch.march_width, rays.dispatch.sheet_rows] = cells(frame.known(), sparse);
     march::record(rec, &rays, quality, refined, &current.marched);
 
     // Asks the frame before for these rays, and compares.
-    let block = ("frame", rays.block(gpu));
-    let grid = [rays.march_width, rays.sheet_rows, 1];
+    let block = rays.dispatch.binding(gpu);
+    let grid = [rays.dispatch.march_width, rays.dispatch.sheet_rows, 1];
     let read = [before.past(), current.read(), vec![block.clone()]].concat();
     rec.clear(&current.votes);
     rec.dispatch(("reproject", "predict"), read.clone(), grid);
@@ -155,11 +157,12 @@ pub(crate) fn record(rec: &mut Recorder<'_>, frame: &Frame, quality: &Quality, i
     // Follows, interpolates, or lists pixels that are to be marched, as neither rays nor past say anything about them.
     let scene_before = vec![("scene_before", buffers.scene_before.depth())];
     let read = [before.past(), current.read(), scene_before, now.bindings(), refined.bindings()].concat();
-    let [columns, rows] = [rays.march_width, frame.known()[1].div_ceil(stride)];
+    let [columns, rows] = [rays.dispatch.march_width, frame.known()[1].div_ceil(stride)];
     rec.clear(&refined.count);
     rec.dispatch_rows(("reproject", "reproject"), &read, [columns, rows], |slice| {
         let (first_row, rows) = (stride * slice.start, stride * slice.len() as u32);
-        Frame { first_row, rows: rows.min(frame.known()[1] - first_row), ..rays.clone() }.block(gpu)
+        let rows = rows.min(frame.known()[1] - first_row);
+        Dispatch { first_row, rows, ..rays.dispatch.clone() }.binding(gpu).1
     });
 
     // A still, where most rays are not what the past says, or more pixels are listed than one marches.
@@ -176,15 +179,15 @@ pub(crate) fn record(rec: &mut Recorder<'_>, frame: &Frame, quality: &Quality, i
 pub(crate) fn begin(rec: &mut Recorder<'_>, frame: &Frame, quality: &Quality, refined: &Refined, out: &Followed) {
     let mut still = frame.of_known();
     march::record(rec, &still, quality, refined, &out.marched);
-    still.lattice = refine::coarsest(&still, quality);
-    let bindings = [vec![("frame", still.block(rec.gpu))], out.bindings()].concat();
+    still.dispatch.lattice = refine::coarsest(&still, quality);
+    let bindings = [vec![still.dispatch.binding(rec.gpu)], out.bindings()].concat();
     let [width, height] = frame.known();
     rec.dispatch(("reproject", "begin"), bindings, [width, height, 1]);
 }
 
 /// Makes of the frame `before`, which had another size or was known at other pixels, one like `frame`.
 pub(crate) fn rescale(rec: &mut Recorder<'_>, frame: &Frame, before: &Followed, out: &Followed) {
-    let bindings = [vec![("frame", frame.block(rec.gpu))], out.bindings(), before.past()].concat();
+    let bindings = [vec![frame.dispatch.binding(rec.gpu)], out.bindings(), before.past()].concat();
     let [width, height] = frame.known();
     rec.dispatch(("reproject", "rescale"), bindings, [width, height, 1]);
 }

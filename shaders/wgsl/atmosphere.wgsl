@@ -230,8 +230,8 @@ fn sky_texel(at: vec2f, size: vec2f) -> vec2f {
     return vec2f(mix(half_texel.x, 1.0 - half_texel.x, at.x), v);
 }
 
-// What the sky map holds is the radiance over `frame.sky.sky_unit`, the sun's irradiance or what the night is as bright as, times
-// `frame.sky.sky_scale`: at most 4 in front of the sun, and 1e-9 at night, which would not fit into half floats (6e-8 to 65,504)
+// What the sky map holds is the radiance over `sky_unit`, the sun's irradiance or what the night is as bright as, times
+// `sky_scale`: at most 4 in front of the sun, and 1e-9 at night, which would not fit into half floats (6e-8 to 65,504)
 // together. The irradiance can be anything.
 // Radiance of the air in a direction, without clouds, sun and ground.
 fn sky_radiance(direction: vec3f) -> vec3f {

@@ -19,7 +19,8 @@ fn beam_share(distance: f32) -> f32 {
 
 // Where they have a direction: the outer texels lie on the rim of the picture, so that a panorama has no seam.
 fn beam_texel(direction: vec3f) -> vec2f {
-    let local = vec3f(dot(direction, frame.view.right), dot(direction, frame.view.up), dot(direction, frame.view.forward));
+    let level = vec2f(dot(direction, frame.view.right), dot(direction, frame.view.up));
+    let local = vec3f(level, dot(direction, frame.view.forward));
     let place = picture_place(local, frame.view.tan_half_fov, frame.view.half_fov).xy * vec2f(0.5, -0.5) + 0.5;
     let size = vec2f(textureDimensions(beams).xy);
     return (saturate(place) * (size - 1.0) + 0.5) / size;

@@ -25,9 +25,9 @@ override WIDE_PHASE: bool = false; // the phase function varies within a pixel
 override LIGHT_DETAIL: bool = true; // there are light samples that see the detail
 override LIGHT_CHEAP: bool = true; // there are light samples that do not
 
-// By how long they hold: what the user sets; what follows from that for a frame; which pixels a dispatch is for. At most these
-// three may decide branches by themselves: of a fourth and later ones, by number, lavapipe (Mesa 22.3) writes where such numbers
-// lie beyond the end of a table, and crashes.
+// By how long they hold: what the user sets; what follows from that for a frame; which pixels a dispatch is for. No
+// other block may decide a branch by itself: of the fourth and later ones of a kernel, by number, lavapipe (Mesa 22.3)
+// notes that beyond the end of a table, and crashes.
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<uniform> frame: Frame;
 @group(0) @binding(28) var<uniform> dispatch: Dispatch;
@@ -65,7 +65,7 @@ override LIGHT_CHEAP: bool = true; // there are light samples that do not
 // Direct sun on the ground around the eye: levels in a stack, and, while they are baked, the mean of the last (passes/shadow).
 @group(0) @binding(72) var ground_shadow: texture_2d<f32>;
 @group(0) @binding(73) var ground_shadow_mean: texture_2d<f32>;
-// Light that the air before a distance lacks in those shadows, by place in the picture, times frame.sky.sky_scale (passes/beams).
+// Light that the air before a distance lacks in those shadows, by place in the picture, times sky_scale (passes/beams).
 @group(0) @binding(51) var beams: texture_3d<f32>;
 
 // One entry a pixel, row by row; of the clouds one for each that they are known at (lattice.wgsl).

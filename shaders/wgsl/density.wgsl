@@ -288,7 +288,8 @@ fn cloud_density(column: Column, shape: f32, width: f32) -> f32 {
         return shape;
     }
     let upper = UPPER && column.medium == UPPER_CLOUD;
-    let curl_at = select(frame.sky.curl_origin, frame.sky.upper_curl_origin, upper) + column.at.xy / params.clouds.curl_scale;
+    let curl_origin = select(frame.sky.curl_origin, frame.sky.upper_curl_origin, upper);
+    let curl_at = curl_origin + column.at.xy / params.clouds.curl_scale;
     let swirl = textureSampleLevel(curl_noise, repeat_sampler, curl_at, 0.0).xy;
     let moved = column.at + vec3f(params.clouds.curl * (1.0 - column.height) * swirl, 0.0);
     let at = select(frame.sky.detail_origin, frame.sky.upper_detail_origin, upper) + moved / params.clouds.detail_scale;
@@ -304,7 +305,7 @@ fn detail_at(at: vec3f, tiles: f32) -> f32 {
     return textureSampleLevel(detail_noise, repeat_sampler, at, log2(max(texels, 1.0))).r;
 }
 
-// The density of a medium as a share of `frame.sky.extinction`: of cloud that has been eroded, or of rain, which is not.
+// The density of a medium as a share of `extinction`: of cloud that has been eroded, or of rain, which is not.
 fn with_share(column: Column, cloud: f32, rain: f32) -> f32 {
     if !(UPPER || RAIN_SHAFTS) {
         return cloud;

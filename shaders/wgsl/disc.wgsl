@@ -22,14 +22,18 @@ struct Disc {
 }
 
 fn sun_disc() -> Disc {
-    return Disc(frame.sky.sun_direction, SUN_RADIUS, frame.view.sun_bounds, params.sun.irradiance, LIMB, perpendicular(frame.sky.sun_direction), 1.0);
+    let at = frame.sky.sun_direction;
+    return Disc(at, SUN_RADIUS, frame.view.sun_bounds, params.sun.irradiance, LIMB, perpendicular(at), 1.0);
 }
 
 // The moon's mean angular radius, 15.54 minutes of arc (as in moon.rs). A full one is as bright at its limb as in its middle.
 const MOON_RADIUS = 0.004520;
 
 fn moon_disc() -> Disc {
-    return Disc(frame.sky.moon_direction, MOON_RADIUS, frame.view.moon_bounds, frame.sky.moon_light, vec3f(0.0), frame.sky.moon_bright, frame.sky.moon_phase);
+    let bounds = frame.view.moon_bounds;
+    let light = frame.sky.moon_light;
+    let phase = frame.sky.moon_phase;
+    return Disc(frame.sky.moon_direction, MOON_RADIUS, bounds, light, vec3f(0.0), frame.sky.moon_bright, phase);
 }
 
 // Radiance that a pixel gets of the discs, on average, through the air.

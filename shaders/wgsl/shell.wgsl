@@ -62,7 +62,8 @@ fn cos_zenith_at(p: vec3f, direction: vec3f) -> f32 {
 
 // The same for a ray from the camera and its own point at a distance, whose altitude is known: no square root.
 fn cos_zenith_along(direction: vec3f, distance: f32, altitude: f32) -> f32 {
-    return (frame.view.centre_distance * dot(frame.view.zenith, direction) + distance) / (params.atmosphere.planet_radius + altitude);
+    let up = frame.view.centre_distance * dot(frame.view.zenith, direction) + distance;
+    return up / (params.atmosphere.planet_radius + altitude);
 }
 
 // The part of a ray where there can be cloud: up to two stretches, the second after the ray has passed under the base.
@@ -81,7 +82,8 @@ fn cloud_stretches(direction: vec3f) -> Stretches {
     if VOLUME {
         return box_stretch(vec3f(0.0), direction, end);
     }
-    return stretches_between(hit_sphere(direction, frame.view.power_top), hit_sphere(direction, frame.view.power_base), end);
+    let top = hit_sphere(direction, frame.view.power_top);
+    return stretches_between(top, hit_sphere(direction, frame.view.power_base), end);
 }
 
 // Of a ray from a point, as if there were no ground.

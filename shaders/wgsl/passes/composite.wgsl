@@ -44,7 +44,7 @@ fn composite(
     compose(vec2u(id.x, dispatch.first_row + id.y));
 }
 
-// The pixels that discs of light are seen in: those of `dispatch.columns` columns from `dispatch.first_column` on, around a panorama.
+// The pixels that discs of light are seen in: those of `columns` columns from `first_column` on, around a panorama.
 @compute @workgroup_size(8, 8)
 fn composite_discs(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= dispatch.columns || id.y >= dispatch.rows {
@@ -145,7 +145,8 @@ fn put(index: u32, sight: Sight) {
         depth[index] = select(-1.0, sight.seen.distance / covered, covered > 0.0);
     }
     let whole = vec4f(sight.seen.radiance + sight.seen.transmittance * sight.background, sight.opacity);
-    image[index] = select(vec4f(sight.seen.radiance, 1.0 - sight.seen.transmittance), whole, frame.view.background > 0u);
+    let clouds_alone = vec4f(sight.seen.radiance, 1.0 - sight.seen.transmittance);
+    image[index] = select(clouds_alone, whole, frame.view.background > 0u);
 }
 
 // What is behind the marched clouds is smooth nearly everywhere, and is worked out at the corners of cells. Most of what

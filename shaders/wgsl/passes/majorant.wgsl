@@ -50,7 +50,8 @@ fn majorant_weather(@builtin(global_invocation_id) id: vec3u) {
     }
     let wettest = weather_from_map(most);
     let driest = weather_from_map(least);
-    let altitudes = mix(vec2f(frame.sky.shell_base), vec2f(frame.sky.shell_top), vec2f(f32(id.z), f32(id.z + 1u)) / f32(size.z));
+    let heights = vec2f(f32(id.z), f32(id.z + 1u)) / f32(size.z);
+    let altitudes = mix(vec2f(frame.sky.shell_base), vec2f(frame.sky.shell_top), heights);
     let base = params.clouds.base;
     // From the lowest that the lower side of the cell can be in its cloud to the highest that its upper side can.
     let heights = vec2f(
@@ -71,7 +72,8 @@ fn majorant_weather(@builtin(global_invocation_id) id: vec3u) {
         // No bound but the largest for what has its own weather.
         let deck = altitudes.y >= params.upper_clouds.base && altitudes.x <= params.upper_clouds.top;
         bound = max(bound, select(0.0, frame.sky.upper_share, UPPER && deck));
-        bound = max(bound, select(0.0, frame.sky.rain_share * wettest.precipitation, RAIN_SHAFTS && altitudes.x < base));
+        let rain = frame.sky.rain_share * wettest.precipitation;
+        bound = max(bound, select(0.0, rain, RAIN_SHAFTS && altitudes.x < base));
     }
     textureStore(volume_out, id, vec4f(ROUND_UP * bound));
 }

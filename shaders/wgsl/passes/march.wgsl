@@ -379,7 +379,8 @@ fn march_ray(direction: vec3f, turned: Turn, limit: f32, offset: f32, within: ve
                 transmittance = transmittance_of(optical_depth);
                 i = select(i, end, transmittance < params.quality.min_transmittance);
             }
-            let share = rays * params.quality.light_share * select(1.0, RAIN_SHARE, RAIN_SHAFTS && column.medium == RAIN);
+            let of_rain = select(1.0, RAIN_SHARE, RAIN_SHAFTS && column.medium == RAIN);
+            let share = rays * params.quality.light_share * of_rain;
             if group.weight > select(share, 0.0, i >= end) {
                 groups[count] = group;
                 count += 1u;

@@ -49,7 +49,8 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
             ray.origin = vec3f(0.0);
             var view = middle;
             if SUBRAYS {
-                let place = random3(vec3u(pixel.y * frame.view.width + pixel.x, frame.view.first_sample + ray.done, 0u), 0u).xy;
+                let number = pixel.y * frame.view.width + pixel.x;
+                let place = random3(vec3u(number, frame.view.first_sample + ray.done, 0u), 0u).xy;
                 view = vec4f(view_direction(ray_place(pixel, place, rays)).xyz, middle.w);
             }
             ray.direction = view.xyz;
@@ -106,7 +107,8 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
                 if ray.scatterings > params.quality.path_scatterings {
                     ray = path_ended(ray);
                 } else if sunlit {
-                    let phase = select(model_phase(one_minus_cos(direction, frame.sky.sun_direction)), seen.phase, ray.scatterings == 1u);
+                    let turned = model_phase(one_minus_cos(direction, frame.sky.sun_direction));
+                    let phase = select(turned, seen.phase, ray.scatterings == 1u);
                     ray.sunlight = ray.throughput * phase * sun_at(p);
                     ray.shadow = 1.0;
                     ray.flight = flight_from(p, frame.sky.sun_direction);
@@ -140,7 +142,8 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
 // Three random numbers in [0, 1), never the same for two pixels, paths or turns.
 fn draw(ray: ptr<function, PathRay>, pixel: vec2u) -> vec3f {
     (*ray).draws += 1u;
-    return random3(vec3u(pixel.y * frame.view.width + pixel.x, frame.view.first_sample + (*ray).done, (*ray).draws), 0u);
+    let number = pixel.y * frame.view.width + pixel.x;
+    return random3(vec3u(number, frame.view.first_sample + (*ray).done, (*ray).draws), 0u);
 }
 
 fn sun_at(p: vec3f) -> vec3f {

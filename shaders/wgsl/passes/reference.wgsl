@@ -183,7 +183,8 @@ fn finished(given: ReferenceRay, index: u32, nodes: Nodes, direction: vec3f, emp
     let result = vec4f(gathered_radiance(sum, nodes, direction), transmittance_of(ray.optical_depth));
     let change = abs(result - ray.previous);
     let dark = DARK * sky_light[2].rgb;
-    let steady = all(change.rgb <= params.quality.tolerance * (result.rgb + dark)) && change.a <= 0.1 * params.quality.tolerance;
+    let tolerance = params.quality.tolerance;
+    let steady = all(change.rgb <= tolerance * (result.rgb + dark)) && change.a <= 0.1 * tolerance;
     if empty || (ray.level > 0u && steady) || ray.level >= MOST_HALVINGS || (ray.level > 0u && evaluations > MOST_EVALUATIONS) {
         clouds[index] = select(result, vec4f(0.0, 0.0, 0.0, 1.0), empty);
         cloud_depth[index] = select(-1.0, ray.distance / whole, !empty && whole > 0.0);

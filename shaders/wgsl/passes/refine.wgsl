@@ -1,6 +1,6 @@
 // Which pixels need rays of their own: pixels between marched ones that look alike are interpolated.
 //
-// A lattice of pixels `dispatch.lattice` apart, with the last column and row, is known. This halves the distance: each pixel
+// A lattice of pixels `lattice` apart, with the last column and row, is known. This halves the distance: each pixel
 // that the finer lattice adds is put on the list of rays, or gets its value here. An invocation has a square of the
 // lattice: the pixel in its middle, and those of its upper and its left edge, which it shares with its neighbours.
 #import bindings

@@ -359,7 +359,8 @@ fn rescale(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= size) {
         return;
     }
-    let scale = vec2f(vec2u(frame.view.previous_width, frame.view.previous_height)) / vec2f(vec2u(frame.view.width, frame.view.height));
+    let before = vec2f(vec2u(frame.view.previous_width, frame.view.previous_height));
+    let scale = before / vec2f(vec2u(frame.view.width, frame.view.height));
     let at = (pixel_place(vec2f(id.xy) + 0.5) * scale - 0.5) / f32(frame.view.previous_spacing);
     let corner = vec2i(floor(at));
     let f = at - floor(at);

@@ -25,9 +25,7 @@ fn sun_disc() -> Disc {
     return Disc(frame.sun_direction, SUN_RADIUS, frame.sun_bounds, params.sun.irradiance, LIMB, perpendicular(frame.sun_direction), 1.0);
 }
 
-// The moon's mean angular radius, 15.54 minutes of arc (as in moon.rs). A full one is as bright at its limb as in its middle.
-const MOON_RADIUS = 0.004520;
-
+// A full moon is as bright at its limb as in its middle.
 fn moon_disc() -> Disc {
     return Disc(frame.moon_direction, MOON_RADIUS, frame.moon_bounds, frame.moon_light, vec3f(0.0), frame.moon_bright, frame.moon_phase);
 }

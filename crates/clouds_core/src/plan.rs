@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::frame::Frame;
 use crate::kernel::Specialization;
 use crate::params::{Model, Params, Quality};
-use crate::passes::refine::COARSEST;
+use crate::passes::refine::TILE;
 use crate::passes::{composite, refine};
 use crate::specialization;
 
@@ -61,7 +61,7 @@ impl Plan {
         frame.sparse = u32::from(march && refine::is_sparse(frame, quality));
         let rows = match integrator {
             _ if whole => frame.height,
-            Integrator::March => (STRIP_PIXELS / frame.width).next_multiple_of(COARSEST),
+            Integrator::March => (STRIP_PIXELS / frame.width).next_multiple_of(TILE),
             Integrator::Reference | Integrator::Path => STRIP_RAYS / frame.width,
         };
         let rows = rows.clamp(1, frame.height);

@@ -4,6 +4,7 @@ use std::collections::HashSet;
 use std::fmt::Write as _;
 use std::path::Path;
 
+use crate::constants;
 use crate::frame::Frame;
 use crate::params::{self, Params, Quality};
 use crate::schema::wgsl_struct;
@@ -83,12 +84,13 @@ impl Linked {
     }
 }
 
-/// The text of a WGSL file. `params` and `frame` are not files: they are written from the one definition of the
-/// parameters, so that they cannot be stale.
+/// The text of a WGSL file. `params`, `frame` and `constants` are not files: they are written from the one definition
+/// of the parameters and of each constant, so that they cannot be stale.
 pub fn read(name: &str) -> Option<String> {
     match name {
         "params" => Some(params_source()),
         "frame" => Some(wgsl_struct(&Frame::default())),
+        "constants" => Some(constants::source()),
         _ => match std::env::var_os(FOLDER) {
             // For work on shaders: read from a folder, without building anything again.
             Some(folder) => std::fs::read_to_string(Path::new(&folder).join(format!("{name}.wgsl"))).ok(),

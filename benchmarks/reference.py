@@ -6,6 +6,7 @@ import functools
 import hashlib
 import json
 import os
+import re
 from pathlib import Path
 
 import numpy as np
@@ -40,11 +41,14 @@ def about(size: Size) -> dict[str, object]:
 
 
 def shader_hash() -> str:
-    """Of all shader files, by name and content."""
+    """Of all shader files, by name and content, and of the constants that they share with Rust."""
     folder = Path(os.environ.get("NUBIS_SHADERS") or ROOT / "shaders" / "wgsl")
     digest = hashlib.sha256()
     for file in sorted(folder.rglob("*.wgsl")):
         digest.update(file.relative_to(folder).as_posix().encode() + b"\0" + file.read_bytes())
+    for file in sorted((ROOT / "crates" / "clouds_core" / "src").rglob("*.rs")):
+        for block in re.findall(rb"^constants! \{.*?^\}", file.read_bytes(), re.DOTALL | re.MULTILINE):
+            digest.update(block)
     return digest.hexdigest()[:16]
 
 

@@ -16,7 +16,7 @@ import twin
 from nubis import Camera, ParameterError, Params, Quality
 from test_params import CLASSES, IMAGES, allowed, filled, kind
 
-AIR_TOP = 100_000.0  # m, as in frame.rs
+AIR_TOP = 100_000.0  # m, where the air ends (Hillaire 2020)
 FARTHEST = 2e8  # m: no eye may be farther from the origin in any coordinate
 
 

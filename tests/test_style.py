@@ -1,4 +1,5 @@
-"""Style that no formatter holds up: the layout of WGSL files, and the version of Rust.
+"""Style that no formatter holds up: the layout of WGSL files, constants that are copied, and the
+version of Rust.
 
 `UPDATE=1 pytest tests/test_style.py` lowers the numbers of wide_lines.json to what is there.
 """
@@ -14,6 +15,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 SHADERS = ROOT / "shaders" / "wgsl"
 FILES = sorted(SHADERS.rglob("*.wgsl"))
+RUST = sorted((ROOT / "crates").rglob("*.rs"))
 WIDTH = tomllib.loads((ROOT / "rustfmt.toml").read_text())["max_width"]
 # Lines of each file that are wider than WIDTH. Numbers only fall; a new file has none.
 WIDE = Path(__file__).parent / "wide_lines.json"
@@ -89,6 +91,24 @@ def test_width():
 
 def test_width_counts_characters():
     assert wide_lines("x\n" + "é" * WIDTH + "\n" + "é" * (WIDTH + 1)) == [3]
+
+
+def copied(text):
+    """What comments say to be as it is in another file, of Rust or WGSL."""
+    joined = re.sub(r"\s+(?://[/!]?)?\s*", " ", text)
+    return re.findall(r"\bas in `?[\w/]+\.(?:rs|wgsl)\b", joined, re.IGNORECASE)
+
+
+@pytest.mark.parametrize("path", FILES + RUST, ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_no_copies(path):
+    """What Rust and WGSL share is declared once (crates/clouds_core/src/constants.rs)."""
+    assert not copied(text_of(path))
+
+
+def test_copies_are_found():
+    for comment in ("const A = 4u; // as in a.rs\n", "// As in `passes/a.wgsl`.\n", "/// as\n/// in a.rs).\n"):
+        assert len(copied(comment)) == 1, comment
+    assert not copied("// As color.rs does, in 8 bits (a.rs), as in passes/march.\n")
 
 
 def test_one_version_of_rust():

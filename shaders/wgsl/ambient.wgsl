@@ -31,7 +31,7 @@ fn cloud_cover() -> f32 {
 
 // The sky as clouds see it: other clouds hide their share of it, about as bright, but white.
 fn clouded_sky(sky: vec3f) -> vec3f {
-    return mix(sky, vec3f(dot(sky, vec3f(0.2126, 0.7152, 0.0722))), cloud_cover());
+    return mix(sky, vec3f(dot(sky, LUMINANCE)), cloud_cover());
 }
 
 // Share of the ambient light at a point that comes from above; the rest comes from below.

@@ -18,10 +18,6 @@ const MIE_G = 0.8;
 const OZONE = vec3f(1.881e-6, 1.881e-6, 0.085e-6);
 const OZONE_ALTITUDE = 25000.0;
 const OZONE_WIDTH = 15000.0;
-// The sun's angular radius, 0.2666 degrees (IAU: 695 700 km at 1 au).
-const SUN_RADIUS = 0.004654;
-// Altitude where the air ends, m (as in frame.rs).
-const AIR_TOP = 100000.0;
 
 // Shares of Rayleigh, aerosol and ozone at an altitude, 1 where they are densest.
 fn air_parts(h: f32) -> vec3f {
@@ -85,7 +81,7 @@ fn air_transmittance(h: f32, mu: f32) -> vec3f {
 fn sun_above_ground(h: f32, mu: f32) -> f32 {
     let ratio = params.atmosphere.planet_radius / (params.atmosphere.planet_radius + max(h, 0.0));
     let horizon = -sqrt(max(1.0 - ratio * ratio, 0.0));
-    return smoothstep(-0.005, 0.005, mu - horizon);
+    return smoothstep(-SUN_EDGE, SUN_EDGE, mu - horizon);
 }
 
 // Share of the sun's light that arrives at a point, on a plane that faces it: the air and the planet are in its way.
@@ -105,10 +101,6 @@ const SCATTERED_SUNWARD = 2u; // the same with the horizontal toward the sun
 const FROM_ABOVE = 3u; // its irradiance on a level plane from above, over pi
 const FROM_BELOW = 4u; // the same from below
 const FLUX_SUNWARD = 5u; // the mean of radiance times the cosine with the horizontal toward the sun
-const TABLES = 6u;
-// Texels of a table: the cosine from nadir to zenith, altitude.
-const TABLE_COSINES = 64u;
-const TABLE_ALTITUDES = 24u;
 
 // Light falls by a factor of two or more with every degree of dusk: its logarithm is what is interpolated, around that of
 // a value in the middle, as half floats are finer there.

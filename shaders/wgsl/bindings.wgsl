@@ -1,4 +1,5 @@
 // Every resource that a shader can name, numbered once. A kernel binds only those that it uses.
+#import constants
 #import params
 #import uniforms
 
@@ -14,7 +15,6 @@ override SUNLIT: bool = true; // the sun can reach the clouds
 override RAINY: bool = true; // it may rain: cumulonimbus grow
 override RAIN_SHAFTS: bool = true; // rain is seen below the clouds
 override UPPER: bool = true; // there is a second deck
-const FINER = 5.0; // how much smaller than the detail the finer one is: a whole number, so that its tiles fill that of the detail
 override BROAD_WEATHER: bool = true; // a larger map shifts the weather
 override PROFILE_TABLE: bool = false; // the profile by height is the user's table
 override BEAMS: bool = false; // clouds cast shadows on the air
@@ -188,9 +188,9 @@ struct PathRay {
 @group(0) @binding(24) var volume_out: texture_storage_3d<rgba16float, write>;
 @group(0) @binding(22) var<storage, read_write> texels_out: array<u32>; // of one channel, two half floats in each
 
-// Words of a row of so many of those: padded to whole 256 bytes, as copies to a texture ask for.
+// Words of a row of so many of those: padded, as copies to a texture ask for.
 fn packed_row(texels: u32) -> u32 {
-    return (texels + 127u) / 128u * 64u;
+    return (texels + (COPIED / 2u - 1u)) / (COPIED / 2u) * (COPIED / 4u);
 }
 
 @group(0) @binding(43) var mix_a: texture_2d<f32>; // weather maps, or orders of scattering, that are mixed

@@ -2,10 +2,6 @@
 #import math
 #import bindings
 
-const PERSPECTIVE = 0u;
-const EQUIRECT = 1u; // centre north, right clockwise from above
-const FISHEYE = 2u; // equidistant: the angle to the axis grows linearly from the centre
-
 // A direction to the right, up and forward, or nothing (w = 0) outside the circle of a fisheye. Of a pinhole its last is 1,
 // which keeps the digits of narrow views; of the others it is one long. `pixel` has its centres at half-integers.
 fn local_direction(pixel: vec2f) -> vec4f {

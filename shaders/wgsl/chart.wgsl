@@ -7,9 +7,6 @@
 // is written as one product, so that nothing cancels however far the eye is from the origin.
 #import bindings
 
-// Nearer to the antipode of the origin, from 172 degrees on, the chart would have no end.
-const CHART_END = 0.01;
-
 fn chart_rise(p: vec3f, altitude: f32) -> f32 {
     return altitude - frame.view.altitude + p.z;
 }

@@ -159,7 +159,7 @@ fn weather_texel(origin: vec2f, at: vec2f, broad: vec4f) -> vec3f {
 
 // How much of a cumulonimbus stands where it rains so much: its tower in the core of the rain, its anvil farther around.
 fn tower(rain: f32) -> f32 {
-    return smoothstep(0.5, 0.9, rain);
+    return smoothstep(TOWER.x, TOWER.y, rain);
 }
 
 // Altitude of the tops: where it rains they grow to those of cumulonimbus (nubis2015).
@@ -179,7 +179,7 @@ const ANVIL = vec4f(0.64, 0.80, 0.88, 1.0);
 
 fn anvil(rain: f32, altitude: f32) -> f32 {
     let height = (altitude - params.clouds.base) / (tallest() - params.clouds.base);
-    let edge = 0.6 - 0.5 * params.clouds.anvil;
+    let edge = ANVIL_EDGE.x - ANVIL_EDGE.y * params.clouds.anvil;
     return smoothstep(edge, edge + 0.3, rain) * profile_between(height, ANVIL);
 }
 
@@ -231,9 +231,6 @@ fn upper_cloud_at(place: vec2f, altitude: f32, broad: vec4f) -> Column {
     let column = Column(limit, profile, coverage, height, 0.0, at, UPPER_CLOUD, 0.0, 0.0);
     return with_extent(column, kind, 0.0, params.upper_clouds.top - base);
 }
-
-// Streaks are so many times longer than wide (as in frame.rs).
-const RAIN_STRETCH = 12.0;
 
 // Rain below the base, thinned by the air that it falls through.
 fn rain_below(weather: LocalWeather, at: vec2f, altitude: f32) -> Column {
@@ -301,7 +298,7 @@ fn cloud_density(column: Column, shape: f32, width: f32) -> f32 {
 // which a cloud that is near has nothing finer than the detail's texels of 13 m (passes/noise). One read for both: with two,
 // the march of `fair_weather` took a seventh longer.
 fn detail_at(at: vec3f, tiles: f32) -> f32 {
-    let texels = tiles * 32.0 * FINER;
+    let texels = tiles * f32(DETAIL_SIZE) * f32(FINER);
     return textureSampleLevel(detail_noise, repeat_sampler, at, log2(max(texels, 1.0))).r;
 }
 

@@ -26,9 +26,7 @@ fn sun_disc() -> Disc {
     return Disc(at, SUN_RADIUS, frame.view.sun_bounds, params.sun.irradiance, LIMB, perpendicular(at), 1.0);
 }
 
-// The moon's mean angular radius, 15.54 minutes of arc (as in moon.rs). A full one is as bright at its limb as in its middle.
-const MOON_RADIUS = 0.004520;
-
+// A full moon is as bright at its limb as in its middle.
 fn moon_disc() -> Disc {
     let bounds = frame.view.moon_bounds;
     let light = frame.sky.moon_light;

@@ -5,10 +5,6 @@
 #import shell
 #import high_layer
 
-// Texels across a level, and levels (as in shadow.rs).
-const SHADOW_SIDE = 88u;
-const SHADOW_LEVELS = 5u;
-
 // The side of a texel of a level, m.
 fn shadow_texel(level: u32) -> f32 {
     return frame.sky.shadow_texel * f32(1u << level);

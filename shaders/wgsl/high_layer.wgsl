@@ -3,9 +3,7 @@
 #import bindings
 #import chart
 
-// How much larger the second read is than the first: no small ratio, so that they do not repeat together (as in frame.rs).
-const BROAD = 3.2;
-// What it adds to the first.
+// What the second, broader read adds to the first.
 const BROAD_SHARE = 0.4;
 
 // How far below the texture's 0 the level sinks that clouds rise above, for a cover of 1: nothing stays clear.

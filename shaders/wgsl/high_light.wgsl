@@ -22,9 +22,6 @@ const HIGH_FADE = 100.0;
 const HIGH_GRAZING = 0.2;
 // Sine of the sun's height above their plane, up or down, within which its light comes in at their sides: 3 degrees.
 const HIGH_SIDE = 0.05;
-// Sines of the sun's height between which it goes over to shine on all of them as it does overhead: 12 and 20 degrees (as in
-// frame.rs).
-const LOW_SUN = vec2f(0.208, 0.342);
 // How much of the light from above a cloud of optical depth 1 turns back: 3/4 (1 - g), two streams, with g = 0.85 of
 // droplets (Hansen 1971).
 const HIGH_ALBEDO = 0.11;

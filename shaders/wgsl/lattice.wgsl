@@ -1,9 +1,6 @@
 // Which pixels the marched clouds are known at: all of them or, in a sparse picture, the corners of cells of four by four.
 #import bindings
 
-// Pixels from one corner of a cell to the next (as in refine.rs).
-const TILE = 4u;
-
 // Pixels from one that is known to the next.
 fn spacing() -> u32 {
     return select(1u, TILE, SPARSE);

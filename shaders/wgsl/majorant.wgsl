@@ -2,9 +2,6 @@
 #import bindings
 #import density
 
-// Voxels of the user's grid along the side of a cell.
-const BRICK = 4u;
-
 struct Majorant {
     density: f32, // never exceeded within `reach` of the point
     reach: f32, // m

@@ -82,8 +82,8 @@ fn finest_feature() -> f32 {
     if VOLUME {
         return 1e30;
     }
-    let detail = params.clouds.detail_scale / (32.0 * FINER / 2.5);
-    let noise = min(params.clouds.shape_scale / 128.0, detail);
+    let detail = params.clouds.detail_scale / (f32(DETAIL_SIZE * FINER) / 2.5);
+    let noise = min(params.clouds.shape_scale / f32(SHAPE_SIZE), detail);
     return min(select(1.0, min(params.upper_clouds.scale, 1.0), UPPER) * noise, thinnest_deck() / 128.0);
 }
 

@@ -19,7 +19,7 @@ fn read_lod(i: u32) -> f32 {
 fn no_reads(start: vec3f, count: u32) -> f32 {
     var sum = vec4f(0.0);
     for (var i = 0u; i < count; i++) {
-        sum += vec4f(read_at(start, i, 128.0), read_lod(i));
+        sum += vec4f(read_at(start, i, f32(SHAPE_SIZE)), read_lod(i));
     }
     return dot(sum, vec4f(1.0));
 }
@@ -35,7 +35,7 @@ fn reads_of_profile_table(start: vec3f, count: u32) -> f32 {
 fn reads_of_broad_map(start: vec3f, count: u32) -> f32 {
     var sum = vec4f(0.0);
     for (var i = 0u; i < count; i++) {
-        sum += textureSampleLevel(broad_map, repeat_sampler, read_at(start, i, 128.0).xy, 0.0);
+        sum += textureSampleLevel(broad_map, repeat_sampler, read_at(start, i, f32(BROAD_SIZE)).xy, 0.0);
     }
     return dot(sum, vec4f(1.0));
 }
@@ -43,7 +43,7 @@ fn reads_of_broad_map(start: vec3f, count: u32) -> f32 {
 fn reads_of_weather_map(start: vec3f, count: u32) -> f32 {
     var sum = vec4f(0.0);
     for (var i = 0u; i < count; i++) {
-        sum += textureSampleLevel(weather_map, repeat_sampler, read_at(start, i, 512.0).xy, 0.0);
+        sum += textureSampleLevel(weather_map, repeat_sampler, read_at(start, i, f32(WEATHER_SIZE)).xy, 0.0);
     }
     return dot(sum, vec4f(1.0));
 }
@@ -51,7 +51,7 @@ fn reads_of_weather_map(start: vec3f, count: u32) -> f32 {
 fn reads_of_shape_noise(start: vec3f, count: u32) -> f32 {
     var sum = vec4f(0.0);
     for (var i = 0u; i < count; i++) {
-        sum += textureSampleLevel(shape_noise, repeat_sampler, read_at(start, i, 128.0), read_lod(i));
+        sum += textureSampleLevel(shape_noise, repeat_sampler, read_at(start, i, f32(SHAPE_SIZE)), read_lod(i));
     }
     return dot(sum, vec4f(1.0));
 }
@@ -59,7 +59,7 @@ fn reads_of_shape_noise(start: vec3f, count: u32) -> f32 {
 fn reads_of_curl_noise(start: vec3f, count: u32) -> f32 {
     var sum = vec4f(0.0);
     for (var i = 0u; i < count; i++) {
-        sum += textureSampleLevel(curl_noise, repeat_sampler, read_at(start, i, 128.0).xy, 0.0);
+        sum += textureSampleLevel(curl_noise, repeat_sampler, read_at(start, i, f32(CURL_SIZE)).xy, 0.0);
     }
     return dot(sum, vec4f(1.0));
 }
@@ -67,7 +67,8 @@ fn reads_of_curl_noise(start: vec3f, count: u32) -> f32 {
 fn reads_of_detail_noise(start: vec3f, count: u32) -> f32 {
     var sum = vec4f(0.0);
     for (var i = 0u; i < count; i++) {
-        sum += textureSampleLevel(detail_noise, repeat_sampler, read_at(start, i, 32.0 * FINER), read_lod(i));
+        let at = read_at(start, i, f32(DETAIL_SIZE * FINER));
+        sum += textureSampleLevel(detail_noise, repeat_sampler, at, read_lod(i));
     }
     return dot(sum, vec4f(1.0));
 }

@@ -2,11 +2,6 @@
 #import bindings
 #import shell
 
-// Distance of what is not there, m (as in scene_depth.rs).
-const NO_SCENE = 1e30;
-// Texels of a row (as in scene_depth.rs): pictures are wider than textures may be.
-const SCENE_ROW = 2048u;
-
 // How far the ray of a pixel goes, m.
 fn scene_distance(pixel: vec2u) -> f32 {
     if !SCENE {

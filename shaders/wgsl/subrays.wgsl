@@ -5,9 +5,6 @@
 #import shell
 #import lattice
 
-// Clouds are this much narrower than the distance from one to the next (`leap_scale`).
-const CLOUD_WIDTH = 0.5;
-
 // How many rays are marched through a pixel: as many as clouds fit into it where its ray meets them.
 fn rays_through(view: vec3f) -> f32 {
     if !SUBRAYS {

@@ -2,11 +2,15 @@
 
 use std::sync::LazyLock;
 
+use crate::constants::constants;
+
 /// The tile, made once in a process.
 pub static TILE: LazyLock<Vec<f32>> = LazyLock::new(tile);
 
-/// Width and height of the tile; a power of two, so that it wraps by masking.
-pub const SIZE: usize = 64;
+constants! {
+    /// Width and height of the tile of blue noise in points; a power of two, so that it wraps by masking.
+    pub const BLUE_SIZE: usize = 64;
+}
 
 /// Standard deviation of the energy of a point in pixels (Ulichney recommends 1.5).
 const SIGMA: f32 = 1.5;
@@ -27,16 +31,17 @@ impl Energy {
                 kernel.push((x, y, (-((x * x + y * y) as f32) / (2.0 * SIGMA * SIGMA)).exp()));
             }
         }
-        Self { kernel, field: vec![0.0; SIZE * SIZE], on: vec![false; SIZE * SIZE] }
+        Self { kernel, field: vec![0.0; BLUE_SIZE * BLUE_SIZE], on: vec![false; BLUE_SIZE * BLUE_SIZE] }
     }
 
     /// Sets or clears a point and updates the energy around it.
     fn set(&mut self, point: usize, on: bool) {
         self.on[point] = on;
         let sign = if on { 1.0 } else { -1.0 };
-        let (x, y) = ((point % SIZE) as isize, (point / SIZE) as isize);
+        let (x, y) = ((point % BLUE_SIZE) as isize, (point / BLUE_SIZE) as isize);
         for &(dx, dy, energy) in &self.kernel {
-            let at = ((y + dy).rem_euclid(SIZE as isize) * SIZE as isize + (x + dx).rem_euclid(SIZE as isize)) as usize;
+            let at = ((y + dy).rem_euclid(BLUE_SIZE as isize) * BLUE_SIZE as isize
+                + (x + dx).rem_euclid(BLUE_SIZE as isize)) as usize;
             self.field[at] += sign * energy;
         }
     }
@@ -52,7 +57,7 @@ impl Energy {
     }
 
     fn extreme(&self, on: bool, better: impl Fn(f32, f32) -> bool) -> usize {
-        let candidates = (0..SIZE * SIZE).filter(|&i| self.on[i] == on);
+        let candidates = (0..BLUE_SIZE * BLUE_SIZE).filter(|&i| self.on[i] == on);
         candidates
             .reduce(|best, i| if better(self.field[i], self.field[best]) { i } else { best })
             .expect("there are points of both kinds")
@@ -63,12 +68,12 @@ impl Energy {
 fn tile() -> Vec<f32> {
     let mut energy = Energy::new();
     // A tenth of the points at pseudo-random places (a Weyl sequence), then relaxed until nothing moves.
-    let count = SIZE * SIZE / 10;
+    let count = BLUE_SIZE * BLUE_SIZE / 10;
     let mut state = 0u32;
     while energy.on.iter().filter(|on| **on).count() < count {
         state = state.wrapping_add(2_654_435_769);
         let mixed = (state ^ (state >> 15)).wrapping_mul(0x2c1b_3c6d);
-        let point = (mixed ^ (mixed >> 12)) as usize % (SIZE * SIZE);
+        let point = (mixed ^ (mixed >> 12)) as usize % (BLUE_SIZE * BLUE_SIZE);
         if !energy.on[point] {
             energy.set(point, true);
         }
@@ -84,7 +89,7 @@ fn tile() -> Vec<f32> {
     }
     let start = energy.on.clone();
 
-    let mut rank = vec![0usize; SIZE * SIZE];
+    let mut rank = vec![0usize; BLUE_SIZE * BLUE_SIZE];
     // Down: take clusters away.
     for r in (0..count).rev() {
         let point = energy.cluster();
@@ -98,12 +103,12 @@ fn tile() -> Vec<f32> {
             energy.set(point, true);
         }
     }
-    for r in count..SIZE * SIZE {
+    for r in count..BLUE_SIZE * BLUE_SIZE {
         let point = energy.void();
         energy.set(point, true);
         rank[point] = r;
     }
-    rank.iter().map(|r| *r as f32 / (SIZE * SIZE) as f32).collect()
+    rank.iter().map(|r| *r as f32 / (BLUE_SIZE * BLUE_SIZE) as f32).collect()
 }
 
 #[cfg(test)]
@@ -112,7 +117,7 @@ mod tests {
 
     #[test]
     fn every_rank_comes_once() {
-        let mut ranks: Vec<_> = tile().iter().map(|v| (v * (SIZE * SIZE) as f32) as usize).collect();
+        let mut ranks: Vec<_> = tile().iter().map(|v| (v * (BLUE_SIZE * BLUE_SIZE) as f32) as usize).collect();
         ranks.sort_unstable();
         assert!(ranks.iter().enumerate().all(|(i, r)| i == *r));
     }
@@ -124,7 +129,7 @@ mod tests {
         let mut sum = 0.0;
         for block in 0..64 {
             let (bx, by) = (8 * (block % 8), 8 * (block / 8));
-            let mean = (0..64).map(|i| tile[(by + i / 8) * SIZE + bx + i % 8]).sum::<f32>() / 64.0;
+            let mean = (0..64).map(|i| tile[(by + i / 8) * BLUE_SIZE + bx + i % 8]).sum::<f32>() / 64.0;
             sum += (mean - 0.5) * (mean - 0.5);
         }
         let deviation = (sum / 64.0).sqrt();

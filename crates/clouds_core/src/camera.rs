@@ -5,10 +5,11 @@
 
 use glam::DVec3;
 
+use crate::constants::constants;
 use crate::error::{Error, Result};
 
-/// How pixels become directions. The discriminants are those of `camera.wgsl`.
-#[derive(Default, Clone, Copy, Debug, PartialEq, Eq)]
+/// How pixels become directions. WGSL has the discriminants.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Projection {
     /// A pinhole; `fov` is the vertical field of view.
     #[default]
@@ -17,6 +18,13 @@ pub enum Projection {
     Equirect = 1,
     /// Equidistant fisheye; `fov` spans the image's shorter side.
     Fisheye = 2,
+}
+
+constants! {
+    /// [`Projection::Equirect`]: image centre north, right clockwise from above.
+    const EQUIRECT: u32 = Projection::Equirect as u32;
+    /// [`Projection::Fisheye`]: equidistant, so that the angle to the axis grows linearly from the centre.
+    const FISHEYE: u32 = Projection::Fisheye as u32;
 }
 
 /// The axes of a camera matrix.

@@ -1,6 +1,7 @@
 //! From scene-linear Rec. 709 radiance to sRGB pixels: the only place where anything is clipped or gamma-encoded.
 
-use crate::blue_noise;
+use crate::blue_noise::{self, BLUE_SIZE};
+use crate::constants::constants;
 use crate::error::{Error, Result};
 
 /// The tone maps by name.
@@ -8,8 +9,32 @@ pub const TONE_MAPS: [&str; 3] = ["agx", "aces", "none"];
 
 type Rgb = [f32; 3];
 
-/// Shares of red, green and blue in the luminance, for Rec. 709 primaries (ITU-R BT.709).
-pub const LUMINANCE: [f64; 3] = [0.2126, 0.7152, 0.0722];
+constants! {
+    /// Shares of red, green and blue in the luminance, for Rec. 709 primaries (ITU-R BT.709).
+    pub const LUMINANCE: [f64; 3] = [0.2126, 0.7152, 0.0722];
+
+    /// What AgX (Troy Sobotka) begins with, for Rec. 709 primaries (Wrensch 2023).
+    const AGX_INSET: [[f32; 3]; 3] = [
+        [0.842_479_06, 0.078_433_6, 0.079_223_745],
+        [0.042_328_242, 0.878_468_64, 0.079_166_13],
+        [0.042_375_655, 0.078_433_6, 0.879_143],
+    ];
+    /// What it ends with (Wrensch 2023).
+    const AGX_OUTSET: [[f32; 3]; 3] = [
+        [1.196_879, -0.098_020_88, -0.099_029_74],
+        [-0.052_896_85, 1.151_903_1, -0.098_961_18],
+        [-0.052_971_635, -0.098_043_45, 1.151_073_7],
+    ];
+    /// Lowest and highest stop around middle grey 0.18 that its curve covers (Wrensch 2023).
+    const AGX_STOPS: [f32; 2] = [-12.473_93, 4.026_069];
+
+    /// What ACES (RRT and sRGB ODT) begins with, in the fit of Stephen Hill (BakingLab, 2016).
+    const ACES_INPUT: [[f32; 3]; 3] =
+        [[0.597_19, 0.354_58, 0.048_23], [0.076, 0.908_34, 0.015_66], [0.028_4, 0.133_83, 0.837_77]];
+    /// What it ends with (Hill 2016).
+    const ACES_OUTPUT: [[f32; 3]; 3] =
+        [[1.604_75, -0.531_08, -0.073_67], [-0.102_08, 1.108_13, -0.006_05], [-0.003_27, -0.072_76, 1.076_02]];
+}
 
 fn transform(m: &[[f32; 3]; 3], v: Rgb) -> Rgb {
     m.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2])
@@ -23,39 +48,22 @@ fn encode_srgb(v: f32) -> f32 {
 
 /// AgX (Troy Sobotka), in the polynomial form of Benjamin Wrensch ("Minimal AgX Implementation", 2023) for Rec. 709
 /// primaries; its output is display-encoded.
-#[expect(clippy::excessive_precision, reason = "as published")]
 fn agx(v: Rgb) -> Rgb {
-    const INSET: [[f32; 3]; 3] = [
-        [0.842_479_06, 0.078_433_6, 0.079_223_745],
-        [0.042_328_242, 0.878_468_64, 0.079_166_13],
-        [0.042_375_655, 0.078_433_6, 0.879_142_97],
-    ];
-    const OUTSET: [[f32; 3]; 3] = [
-        [1.196_879, -0.098_020_88, -0.099_029_745],
-        [-0.052_896_85, 1.151_903_1, -0.098_961_18],
-        [-0.052_971_635, -0.098_043_45, 1.151_073_7],
-    ];
-    // Stops around middle grey 0.18 that the curve covers.
-    const MIN_EV: f32 = -12.473_93;
-    const MAX_EV: f32 = 4.026_069;
+    let [low, high] = AGX_STOPS;
     let curve = |x: f32| {
         let x2 = x * x;
         let x4 = x2 * x2;
         15.5 * x4 * x2 - 40.14 * x4 * x + 31.96 * x4 - 6.868 * x2 * x + 0.4298 * x2 + 0.1191 * x - 0.002_32
     };
-    let log = |v: f32| ((v.max(1e-10).log2() - MIN_EV) / (MAX_EV - MIN_EV)).clamp(0.0, 1.0);
-    transform(&OUTSET, transform(&INSET, v).map(|v| curve(log(v)))).map(|v| v.clamp(0.0, 1.0))
+    let log = |v: f32| ((v.max(1e-10).log2() - low) / (high - low)).clamp(0.0, 1.0);
+    transform(&AGX_OUTSET, transform(&AGX_INSET, v).map(|v| curve(log(v)))).map(|v| v.clamp(0.0, 1.0))
 }
 
 /// ACES (RRT and sRGB ODT), in the fit of Stephen Hill (BakingLab, 2016).
 fn aces(v: Rgb) -> Rgb {
-    const INPUT: [[f32; 3]; 3] =
-        [[0.597_19, 0.354_58, 0.048_23], [0.076, 0.908_34, 0.015_66], [0.028_4, 0.133_83, 0.837_77]];
-    const OUTPUT: [[f32; 3]; 3] =
-        [[1.604_75, -0.531_08, -0.073_67], [-0.102_08, 1.108_13, -0.006_05], [-0.003_27, -0.072_76, 1.076_02]];
     let fit = |v: f32| (v * (v + 0.024_578_6) - 0.000_090_537) / (v * (0.983_729 * v + 0.432_951) + 0.238_081);
     // The fit is for what a display could show: negative and endless light would come out anywhere.
-    transform(&OUTPUT, transform(&INPUT, v.map(|v| v.clamp(0.0, 65504.0))).map(fit)).map(encode_srgb)
+    transform(&ACES_OUTPUT, transform(&ACES_INPUT, v.map(|v| v.clamp(0.0, 65504.0))).map(fit)).map(encode_srgb)
 }
 
 /// Which of [`TONE_MAPS`] is meant, of values that are allowed.
@@ -91,9 +99,9 @@ pub fn to_srgb8(
     let mut out = Vec::with_capacity(pixels.len());
     for (y, row) in pixels.chunks(channels * width.max(1)).enumerate() {
         for (x, pixel) in row.chunks_exact(channels).enumerate() {
-            let rank = tile.get(y % blue_noise::SIZE * blue_noise::SIZE + x % blue_noise::SIZE);
+            let rank = tile.get(y % BLUE_SIZE * BLUE_SIZE + x % BLUE_SIZE);
             // A rank is that below its point: half a step of ranks is missing to the mean of 1/2.
-            let threshold = rank.map_or(0.5, |rank| rank + 0.5 / (blue_noise::SIZE * blue_noise::SIZE) as f32);
+            let threshold = rank.map_or(0.5, |rank| rank + 0.5 / (BLUE_SIZE * BLUE_SIZE) as f32);
             let gain = match pixel.get(3) {
                 Some(alpha) if *alpha > 0.0 => gain / alpha.min(1.0),
                 Some(_) => 0.0,

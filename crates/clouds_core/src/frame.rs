@@ -7,9 +7,10 @@ use std::f64::consts::{FRAC_PI_2, PI as PI64};
 use glam::{DVec2, DVec3, Vec3};
 
 use crate::camera::{Camera, Projection};
+use crate::constants::constants;
 use crate::gpu::Gpu;
 use crate::kernel::Binding;
-use crate::luts::{broad_weather, shadow};
+use crate::luts::{broad_weather, high_clouds, shadow};
 use crate::moon::MOON_RADIUS;
 use crate::params;
 use crate::params::{Edge, Model, Params, Phase};
@@ -46,26 +47,27 @@ pub struct Frame {
     pub beams: bool,
 }
 
-/// How much larger the second read of the high clouds' texture is than the first (as in high_layer.wgsl).
-const HIGH_BROAD: f32 = 3.2;
+constants! {
+    /// Altitude where the air ends, m (Hillaire 2020).
+    const AIR_TOP: f64 = 100_000.0;
+    /// The sun's angular radius, radians: 0.2666 degrees (IAU: 695 700 km at 1 au).
+    const SUN_RADIUS: f64 = 0.004_654;
+    /// Sine of the angle to the horizon from which on the sun is seen whole, or not at all: half its width, rounded up.
+    const SUN_EDGE: f64 = 0.005;
+    /// How many times longer than wide streaks of rain are.
+    const RAIN_STRETCH: f64 = 12.0;
+    /// Width of clouds, as a share of the distance from one to the next (`leap_scale`).
+    const CLOUD_WIDTH: f32 = 0.5;
+    /// Least that the chart's scale is the planet's diameter over, planet radii: nearer to the antipode of the origin,
+    /// from 172 degrees on, the chart would have no end.
+    const CHART_END: f64 = 0.01;
+}
 
-/// Sine of the sun's height, 20 degrees, above which its light is as good as the same on all high clouds in sight (as in
-/// high_light.wgsl).
-const HIGH_LOW_SUN: f64 = 0.342;
-
-/// What the sun's half width, 0.005 as in atmosphere.wgsl, and f32 may add to its height, radians.
-const HALF_SUN: f64 = 0.006;
+/// What the sun's half width and f32 may add to its height, radians.
+const HALF_SUN: f64 = SUN_EDGE + 0.001;
 
 /// Speed of falling rain, m/s: of drops of 2.5 mm (Gunn and Kinzer 1949).
 const RAIN_SPEED: f64 = 7.4;
-/// How many times longer than wide its streaks are (as in density.wgsl).
-const RAIN_STRETCH: f64 = 12.0;
-
-/// Altitude where the air ends, m (Hillaire 2020).
-const AIR_TOP: f64 = 100_000.0;
-
-/// The sun's angular radius (as in atmosphere.wgsl), radians.
-const SUN_RADIUS: f64 = 0.004_654;
 
 /// Widest pixel that sees the glow around the sun as it is in its middle, radians: a seventh of the half width of the forward
 /// peak of aerosol (g = 0.8), with which the mean differs by 0.5 % where it is brightest.
@@ -162,12 +164,6 @@ fn leap_scale(params: &Params) -> f32 {
     };
     params.weather_shares().into_iter().map(of_weather).fold(params.clouds.shape_scale, f32::min)
 }
-
-/// Clouds are this much narrower than the distance from one to the next (as in subrays.wgsl).
-const CLOUD_WIDTH: f32 = 0.5;
-
-/// As in chart.wgsl, where the chart ends near the antipode of the origin.
-const CHART_END: f64 = 0.01;
 
 /// What the scale of the chart at a point is the planet's diameter over, m (chart.wgsl).
 fn chart_reach(at: DVec3, radius: f64) -> f64 {
@@ -363,7 +359,7 @@ impl Frame {
         let horizon = -(1.0 - (radius / (radius + height)).powi(2)).max(0.0).sqrt();
         let cosine = Vec3::from_array(self.view.zenith).dot(Vec3::from_array(self.sky.sun_direction));
         // The sun's half degree, and what f32 may be off.
-        f64::from(cosine) - horizon > -0.005 - 1e-5 && params.sun.irradiance != [0.0; 3]
+        f64::from(cosine) - horizon > -SUN_EDGE - 1e-5 && params.sun.irradiance != [0.0; 3]
     }
 
     /// Whether clouds cast shadows on the ground that `camera` sees.
@@ -414,7 +410,7 @@ impl Frame {
     fn set_high_sun(&mut self, params: &Params) {
         let up = self.sun_above(params, f64::from(params.high_clouds.altitude));
         self.high_emboss = up && params.high_clouds.emboss > 0.0;
-        self.high_low_sun = self.sun_sine() < HIGH_LOW_SUN;
+        self.high_low_sun = self.sun_sine() < high_clouds::LOW_SUN[1];
     }
 
     /// Sine of the sun's height at the eye.
@@ -566,7 +562,7 @@ impl Frame {
         let across = DVec2::new(-along.y, along.x);
         let at = DVec2::new(eye.dot(along), eye.dot(across)) - carried.high;
         self.sky.high_origin = plane(at, high.scale);
-        self.sky.high_broad_origin = plane(at, HIGH_BROAD * high.scale);
+        self.sky.high_broad_origin = plane(at, high_clouds::BROAD * high.scale);
         self.sky.high_direction = along.as_vec2().to_array();
         // In steps of a 256th of the smallest octave's life, which change no pixel by more than four thousandths: a new
         // texture in every frame would take longer than all else that is baked.
@@ -574,8 +570,8 @@ impl Frame {
         let time = if step.is_finite() { (time / step).round() * step } else { time };
         for octave in 0..8 {
             let updates = (time * f64::from(high.evolution) + params.drift.evolution) * f64::from(1u32 << octave);
-            // Update numbers come round after 65,536, exact in f32 (passes/high_clouds.wgsl).
-            let (number, age) = (updates.floor().rem_euclid(65536.0) as f32, (updates - updates.floor()) as f32);
+            let number = updates.floor().rem_euclid(f64::from(high_clouds::UPDATES)) as f32;
+            let age = (updates - updates.floor()) as f32;
             let (numbers, ages) = if octave < 4 {
                 (&mut self.sky.high_update, &mut self.sky.high_age)
             } else {

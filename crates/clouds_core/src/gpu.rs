@@ -10,6 +10,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use crate::cache::Pipelines;
+use crate::constants::constants;
 use crate::error::{Error, Result};
 use crate::kernel::{Kernel, Key, Name, Program, Specialization};
 use crate::shader::{self, Linked};
@@ -642,8 +643,10 @@ impl Timings {
 /// Buffers that shaders write and we read.
 const IN_PLACE: wgpu::Features = wgpu::Features::MAPPABLE_PRIMARY_BUFFERS;
 
-/// What the rows of a texture that is copied to or from a buffer are padded to, bytes.
-pub(crate) const COPIED: u32 = wgpu::COPY_BYTES_PER_ROW_ALIGNMENT;
+constants! {
+    /// What the rows of a texture that is copied to or from a buffer are padded to, bytes (WebGPU).
+    pub(crate) const COPIED: u32 = wgpu::COPY_BYTES_PER_ROW_ALIGNMENT;
+}
 
 /// The mips of a texture of half floats, and where their texels lie in memory, one mip after the other, their rows padded.
 pub(crate) fn mips(

@@ -8,6 +8,7 @@ pub mod cache;
 pub mod camera;
 mod clipmap;
 pub mod color;
+mod constants;
 pub mod error;
 pub mod files;
 pub mod frame;

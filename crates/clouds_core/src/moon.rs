@@ -3,11 +3,14 @@
 
 use glam::DVec3;
 
+use crate::constants::constants;
 use crate::frame::{Frame, direction_to, sun_direction};
 use crate::params::{Moon, Params, Sun};
 
-/// The moon's mean angular radius, 15.54 minutes of arc (Allen's Astrophysical Quantities), radians.
-pub(crate) const MOON_RADIUS: f64 = 0.004_520;
+constants! {
+    /// The moon's mean angular radius, 15.54 minutes of arc (Allen's Astrophysical Quantities), radians.
+    pub(crate) const MOON_RADIUS: f64 = 0.004_520;
+}
 
 /// Phase angle, degrees, from which on a crescent is as bright as its lit share says: the law is of moons up to there.
 const LAST_CRESCENT: f64 = 150.0;

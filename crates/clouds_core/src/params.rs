@@ -6,6 +6,7 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
+use crate::constants::constants;
 use crate::error::{Error, Result};
 use crate::schema::{self, Block, Map, Table, Typed as _};
 use crate::uniforms;
@@ -499,6 +500,14 @@ const UNSEEN: f32 = 0.01;
 /// (Rayleigh scattering at 550 nm, sea level).
 const FAINTEST_RAIN: [f32; 2] = [1.5e-6, 1e-5];
 
+constants! {
+    /// Shares of the heaviest rain between which a cloud grows from none to all of the tower of a cumulonimbus.
+    const TOWER: [f32; 2] = [0.5, 0.9];
+    /// Share of the heaviest rain from which on a cumulonimbus has an anvil, for an `anvil` of 0, and how much less that
+    /// is for one of 1.
+    const ANVIL_EDGE: [f32; 2] = [0.6, 0.5];
+}
+
 fn lerp(a: f32, b: f32, share: f32) -> f32 {
     a + share * (b - a)
 }
@@ -726,9 +735,9 @@ impl Params {
             return clouds.top;
         }
         let tallest = clouds.top.max(clouds.cumulonimbus_top);
-        let anvil = 0.6 - 0.5 * clouds.anvil;
-        let grown =
-            smoothstep(0.5, 0.9, clouds.precipitation).max(smoothstep(anvil - 0.1, anvil, clouds.precipitation));
+        let anvil = ANVIL_EDGE[0] - ANVIL_EDGE[1] * clouds.anvil;
+        let rain = clouds.precipitation;
+        let grown = smoothstep(TOWER[0], TOWER[1], rain).max(smoothstep(anvil - 0.1, anvil, rain));
         lerp(clouds.top, tallest, grown)
     }
 

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::frame::Frame;
 use crate::kernel::Specialization;
 use crate::params::{Model, Params, Quality};
-use crate::passes::refine::COARSEST;
+use crate::passes::refine::TILE;
 use crate::passes::{composite, refine};
 use crate::specialization;
 
@@ -61,7 +61,7 @@ impl Plan {
         frame.sparse = march && refine::is_sparse(frame, quality);
         let rows = match integrator {
             _ if whole => frame.view.height,
-            Integrator::March => (STRIP_PIXELS / frame.view.width).next_multiple_of(COARSEST),
+            Integrator::March => (STRIP_PIXELS / frame.view.width).next_multiple_of(TILE),
             Integrator::Reference | Integrator::Path => STRIP_RAYS / frame.view.width,
         };
         let rows = rows.clamp(1, frame.view.height);

@@ -14,6 +14,7 @@ use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::Instant;
 
+use crate::constants::constants;
 use crate::error::Result;
 use crate::gpu::{COPIED, Download, Gpu, Interrupt, Timings, lock, mips, texture_bytes};
 use crate::kernel::{Binding, Bindings, Kernel, Name, Resources, Specialization};
@@ -27,12 +28,17 @@ const PER_DISPATCH: &str = "dispatch";
 const MOST_GROUPS: u32 = 65_535;
 /// What uniform blocks are aligned to, bytes (WebGPU's default limit).
 const ALIGNED: usize = 256;
-/// Bytes from the arguments of one indirect dispatch to those of the next, which are workgroups along each side and how many
-/// invocations the whole list has: each can be bound as a uniform.
-const ARGUMENT_STRIDE: u64 = ALIGNED as u64;
-/// Invocations of a workgroup of a list, and along the sides of one of a conditional grid (arrange.wgsl).
-const LIST_GROUP: u32 = 64;
-const GRID_GROUP: u32 = 8;
+
+constants! {
+    /// Bytes from the arguments of one indirect dispatch to those of the next, which are workgroups along each side and
+    /// how many invocations the whole list has: each can be bound as a uniform.
+    const ARGUMENT_STRIDE: u64 = ALIGNED as u64;
+    /// Invocations of a workgroup of a list.
+    const LIST_GROUP: u32 = 64;
+    /// Invocations along each side of a workgroup of a grid that is dispatched under a condition or in slices of rows.
+    const GRID_GROUP: u32 = 8;
+}
+
 /// Most dispatches of a recording that are timed: WebGPU allows 4,096 queries in a set.
 const MOST_TIMED: usize = 2048;
 
@@ -186,9 +192,10 @@ impl<'a> Recorder<'a> {
         [width, rows]: [u32; 2],
         block: impl Fn(Range<u32>) -> Binding,
     ) {
-        // Whole workgroups of eight rows.
-        let most = self.gpu.most_invocations(name.1, SLICE_SECONDS) / u64::from(width) / 8 * 8;
-        let most = most.clamp(8, u64::from(MOST_GROUPS)) as u32;
+        // Whole workgroups.
+        let group = u64::from(GRID_GROUP);
+        let most = self.gpu.most_invocations(name.1, SLICE_SECONDS) / u64::from(width) / group * group;
+        let most = most.clamp(group, u64::from(MOST_GROUPS)) as u32;
         for first in (0..rows).step_by(most as usize) {
             let slice = first..(first + most).min(rows);
             let size = [width, slice.len() as u32, 1];

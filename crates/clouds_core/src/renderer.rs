@@ -13,7 +13,7 @@ use crate::luts::{Inputs, Luts};
 use crate::params::{Model, Params, Quality};
 use crate::passes::composite::Parts;
 use crate::passes::display::{self, Screen};
-use crate::passes::refine::COARSEST;
+use crate::passes::refine::TILE;
 use crate::passes::{composite, march, path, reference, refine, reproject};
 use crate::plan::{Integrator, Plan};
 use crate::recorder::Recorder;
@@ -409,8 +409,8 @@ impl Picture {
 /// A number for each pixel of a part of a sparse picture: where it is known, one of `numbers`, which has so many columns, and
 /// none between.
 fn at_known(numbers: &[u32], columns: u32, [width, height]: [u32; 2]) -> impl Iterator<Item = u32> {
-    let place = move |x: u32, y: u32| (y / COARSEST * columns + x / COARSEST) as usize;
-    let known = |x: u32, y: u32| x.is_multiple_of(COARSEST) && y.is_multiple_of(COARSEST);
+    let place = move |x: u32, y: u32| (y / TILE * columns + x / TILE) as usize;
+    let known = |x: u32, y: u32| x.is_multiple_of(TILE) && y.is_multiple_of(TILE);
     (0..height).flat_map(move |y| (0..width).map(move |x| if known(x, y) { numbers[place(x, y)] } else { 0 }))
 }
 

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use crate::constants::constants;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::kernel::{Binding, Bindings};
@@ -9,9 +10,13 @@ use crate::kernel::{Binding, Bindings};
 /// Farthest distance of a scene, m: what is beyond it counts as sky, as infinity does. Five times the diameter of the
 /// largest planet. Rasterizers call the sky 1e10 and more, or the largest f32.
 pub const FARTHEST: f32 = 1e10;
-/// Distance of what is not there, m, and texels of a row (as in scene_depth.wgsl).
-const NO_SCENE: f32 = 1e30;
-const ROW: u32 = 2048;
+
+constants! {
+    /// Distance of a scene that is not there, m: beyond all others.
+    const NO_SCENE: f32 = 1e30;
+    /// Texels of a row of the scene's textures: pictures are wider than textures may be.
+    const SCENE_ROW: u32 = 2048;
+}
 
 /// A scene among the clouds, pixel by pixel.
 #[derive(Clone, Copy, Debug)]
@@ -46,13 +51,13 @@ pub(crate) struct SceneTextures {
 
 impl SceneTextures {
     /// Most pixels of a sheet: textures have at least so many rows.
-    pub const MOST_PIXELS: u64 = 8192 * ROW as u64;
+    pub const MOST_PIXELS: u64 = 8192 * SCENE_ROW as u64;
 
     /// For sheets of so many pixels; of none where there is no scene, as kernels that ask for none want something bound.
     pub fn new(gpu: &Gpu, pixels: u64, colored: bool) -> Self {
         let texture = |label, pixels: u64, format| {
-            let width = if pixels > 0 { ROW } else { 1 };
-            gpu.flat(label, [width, (pixels as u32).div_ceil(ROW).max(1)], format)
+            let width = if pixels > 0 { SCENE_ROW } else { 1 };
+            gpu.flat(label, [width, (pixels as u32).div_ceil(SCENE_ROW).max(1)], format)
         };
         let depth = texture("scene_depth", pixels, wgpu::TextureFormat::R32Float);
         let color = texture("scene_color", if colored { pixels } else { 0 }, wgpu::TextureFormat::Rgba32Float);

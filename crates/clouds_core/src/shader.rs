@@ -4,6 +4,7 @@ use std::collections::HashSet;
 use std::fmt::Write as _;
 use std::path::Path;
 
+use crate::constants;
 use crate::params::{self, Params, Quality};
 use crate::schema::{Block, wgsl_struct};
 use crate::uniforms::{Dispatch, Sky, View};
@@ -83,11 +84,12 @@ impl Linked {
     }
 }
 
-/// The text of a WGSL file. `params` and `uniforms` are not files: they are written from the one definition of the
-/// parameters, so that they cannot be stale.
+/// The text of a WGSL file. `params`, `uniforms` and `constants` are not files: they are written from the one definition
+/// of the parameters and of each constant, so that they cannot be stale.
 pub fn read(name: &str) -> Option<String> {
     match name {
         "params" => Some(params_source()),
+        "constants" => Some(constants::source()),
         "uniforms" => {
             let parts: [&dyn Block; 3] = [&View::default(), &Sky::default(), &Dispatch::default()];
             let frame = "struct Frame {\n    @align(16) view: View,\n    @align(16) sky: Sky,\n}\n";

@@ -386,7 +386,7 @@ pub(crate) fn fastest(params: &Params) -> f64 {
     f64::from(level.max(wind.updraft.abs()))
 }
 
-/// As in random.wgsl.
+/// Three 32-bit hashes of three (pcg3d: Jarzynski and Olano, "Hash Functions for GPU Rendering", JCGT 2020).
 fn pcg3d(v: [u32; 3]) -> [u32; 3] {
     let mix = |[x, y, z]: [u32; 3]| {
         let x = x.wrapping_add(y.wrapping_mul(z));

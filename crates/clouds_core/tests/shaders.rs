@@ -1,5 +1,7 @@
 //! Every shader links and is valid, and agrees with the parameters; no GPU needed.
 
+use std::collections::BTreeSet;
+
 use clouds_core::params::{self, Params, Quality};
 use clouds_core::schema::{Block, size, wgsl_name};
 use clouds_core::shader::{self, Linked};
@@ -25,6 +27,35 @@ fn every_shader_opens_with_a_sentence() {
         let source = shader::read(name).expect("listed");
         assert!(source.starts_with("// "), "shaders/wgsl/{name}.wgsl must open with what it computes");
     }
+}
+
+/// The name that a line of WGSL declares as a constant, maybe within a function.
+fn declared(line: &str) -> Option<&str> {
+    let rest = line.trim_start().strip_prefix("const ")?;
+    Some(rest.split([':', '=', ' ']).next().unwrap_or(rest))
+}
+
+#[test]
+fn no_shader_declares_a_constant_of_rust_again() {
+    let generated = shader::read("constants").expect("is generated");
+    let shared: BTreeSet<_> = generated.lines().filter_map(declared).collect();
+    assert!(shared.contains("AIR_TOP") && shared.len() == generated.lines().count(), "{generated}");
+    for name in shader::names() {
+        let source = shader::read(name).expect("listed");
+        let again: Vec<_> = source.lines().filter_map(declared).filter(|name| shared.contains(name)).collect();
+        assert!(again.is_empty(), "shaders/wgsl/{name}.wgsl declares {again:?}, which Rust does");
+    }
+}
+
+/// One that only Rust uses need not be shared.
+#[test]
+fn shaders_read_each_constant_of_rust() {
+    let generated = shader::read("constants").expect("is generated");
+    let sources: Vec<_> = shader::names().map(|name| shader::read(name).expect("listed")).collect();
+    let is_word = |c: char| c.is_alphanumeric() || c == '_';
+    let words: BTreeSet<_> = sources.iter().flat_map(|source| source.split(|c| !is_word(c))).collect();
+    let unread: Vec<_> = generated.lines().filter_map(declared).filter(|name| !words.contains(name)).collect();
+    assert!(unread.is_empty(), "{unread:?}");
 }
 
 #[test]

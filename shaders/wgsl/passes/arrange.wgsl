@@ -1,12 +1,6 @@
 // Arguments of indirect dispatches: how many workgroups a list needs, or whether a grid is wanted.
 #import bindings
 
-// Invocations of a workgroup of a list (recorder.rs).
-const GROUP = 64u;
-
-// Numbers from one set of arguments to the next: each begins where a uniform block may.
-const STRIDE = 64u;
-
 // Of a list in slices: an invocation for each. Workgroups along x, y, z, and how many invocations the whole list has.
 @compute @workgroup_size(64)
 fn arrange_list(@builtin(global_invocation_id) id: vec3u) {
@@ -17,7 +11,7 @@ fn arrange_list(@builtin(global_invocation_id) id: vec3u) {
     }
     let invocations = list_count * arrangement.z;
     let left = invocations - min(invocations, id.x * most);
-    let groups = (min(left, most) + GROUP - 1u) / GROUP;
+    let groups = (min(left, most) + LIST_GROUP - 1u) / LIST_GROUP;
     put_arguments(id.x, vec4u(groups, 1u, 1u, invocations));
 }
 
@@ -30,6 +24,6 @@ fn arrange_grid() {
 
 fn put_arguments(slice: u32, values: vec4u) {
     for (var i = 0u; i < 4u; i++) {
-        arguments[STRIDE * slice + i] = values[i];
+        arguments[ARGUMENT_STRIDE / 4u * slice + i] = values[i];
     }
 }

@@ -10,7 +10,7 @@
 // Steps between two slices. At 2 rings show in the sky of `sunset`; at 8 what the air lacks errs as much as at 3, by 2 to 10 %
 // where shadows are smooth (tests/test_beams.py).
 const STEPS = 3u;
-// Angle below the horizon of the rays that are next to others above it, radians: three times that between rays (as in beams.rs).
+// Angle below the horizon of the rays that are next to others above it, radians: three times that between rays.
 const SUNK = 0.05;
 
 @compute @workgroup_size(8, 8)

@@ -28,16 +28,13 @@ const SHADOW_EDGE = 2.0;
 const FINE = 1e20;
 const EDGE = 1e30;
 
-// Luminance of Rec. 709 red, green and blue.
-const LUMINANCE = vec3f(0.2126, 0.7152, 0.0722);
-
-@compute @workgroup_size(8, 8)
+@compute @workgroup_size(GRID_GROUP, GRID_GROUP)
 fn composite(
     @builtin(workgroup_id) group: vec3u,
     @builtin(num_workgroups) groups: vec3u,
     @builtin(local_invocation_id) local: vec3u,
 ) {
-    let id = 8u * spread_rows(group.xy, groups.xy) + local.xy;
+    let id = GRID_GROUP * spread_rows(group.xy, groups.xy) + local.xy;
     if id.x >= frame.view.width || id.y >= dispatch.rows {
         return;
     }
@@ -420,7 +417,7 @@ fn nearest_scene(first: vec2u) -> f32 {
 }
 
 // The pixels of the cells of the list.
-@compute @workgroup_size(64)
+@compute @workgroup_size(LIST_GROUP)
 fn composite_list(@builtin(global_invocation_id) id: vec3u) {
     let number = dispatch.first_ray + id.x;
     if number >= listed.w {

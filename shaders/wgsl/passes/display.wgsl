@@ -16,7 +16,7 @@ fn display(@builtin(global_invocation_id) id: vec3u) {
     } else if shown.y == 1.0 {
         color = aces(radiance);
     }
-    // Half a step of blue noise to each side, as color.rs adds it: the store rounds. Ranks are of 64 x 64 points.
-    let noise = textureLoad(blue_noise, pixel % 64u, 0).r + 0.5 / 4096.0 - 0.5;
+    // Half a step of blue noise to each side, as color.rs adds it: the store rounds. A rank is that below its point.
+    let noise = textureLoad(blue_noise, pixel % BLUE_SIZE, 0).r + 0.5 / f32(BLUE_SIZE * BLUE_SIZE) - 0.5;
     textureStore(screen, pixel, vec4f(color + noise / 255.0, 1.0));
 }

@@ -3,9 +3,6 @@
 #import bindings
 #import gradient_noise
 
-// Updates after which their numbers come round, as in frame.rs.
-const UPDATES = 65536u;
-
 // Cells of the largest octave in a tile: of streaks, and puffs.
 const STREAKS = 4u;
 const CELLS = 12u;
@@ -139,7 +136,7 @@ fn octave_at(i: u32) -> Octave {
     // Small octaves are replaced more often; between two updates each fades linearly from the old to the new.
     let age = select(frame.sky.high_age, frame.sky.high_age_small, i >= 4u)[i % 4u];
     let update = u32(select(frame.sky.high_update, frame.sky.high_update_small, i >= 4u)[i % 4u]);
-    // The numbers come round (frame.rs): after the last update comes the first.
+    // The numbers come round: after the last update comes the first.
     let salts = i * 7u + vec2u(update, (update + 1u) % UPDATES) * 977u;
     return Octave(salts, age, steadied(age));
 }

@@ -8,13 +8,13 @@
 #import scene_depth
 #import subrays
 
-@compute @workgroup_size(8, 8)
+@compute @workgroup_size(GRID_GROUP, GRID_GROUP)
 fn march(
     @builtin(workgroup_id) group: vec3u,
     @builtin(num_workgroups) groups: vec3u,
     @builtin(local_invocation_id) local: vec3u,
 ) {
-    let id = 8u * spread_over(group.xy, groups.xy) + local.xy;
+    let id = GRID_GROUP * spread_over(group.xy, groups.xy) + local.xy;
     if id.x >= dispatch.march_width || id.y >= dispatch.rows {
         return;
     }
@@ -22,13 +22,13 @@ fn march(
 }
 
 // Marches the pixels of a list (passes/refine).
-@compute @workgroup_size(64)
+@compute @workgroup_size(LIST_GROUP)
 fn march_list(
     @builtin(workgroup_id) group: vec3u,
     @builtin(num_workgroups) groups: vec3u,
     @builtin(local_invocation_id) local: vec3u,
 ) {
-    let number = dispatch.first_ray + 64u * spread(group.x, groups.x) + local.x;
+    let number = dispatch.first_ray + LIST_GROUP * spread(group.x, groups.x) + local.x;
     if number >= listed.w {
         return;
     }
@@ -108,7 +108,7 @@ fn march_pixel(pixel: vec2u, view: vec3f, within: vec2f) -> Cloud {
 // One blue-noise offset of up to a step for the whole ray: it turns bands into fine noise at no cost in error, where
 // an offset for each step would cost twenty times the error (docs/numerics.md).
 fn ray_offset(pixel: vec2u) -> f32 {
-    let rank = textureLoad(blue_noise, pixel % 64u, 0).r;
+    let rank = textureLoad(blue_noise, pixel % BLUE_SIZE, 0).r;
     // The largest rank is 1 as a half float.
     return select(0.5, fract(rank), params.quality.jitter > 0u);
 }

@@ -82,7 +82,7 @@ fn finer_detail(@builtin(global_invocation_id) id: vec3u) {
     let p = tile_point(id, size);
     let detail = textureSampleLevel(volume_in, repeat_sampler, p, 0.0).r;
     // Its axes are others, so that the two show no pattern together. Its mean is 0.5.
-    let fine = textureSampleLevel(volume_in, repeat_sampler, FINER * p.zxy, 0.0).r;
+    let fine = textureSampleLevel(volume_in, repeat_sampler, f32(FINER) * p.zxy, 0.0).r;
     textureStore(volume_out, id, vec4f(saturate(detail + params.clouds.fine_detail * (fine - 0.5))));
 }
 
@@ -93,17 +93,16 @@ fn curl_potential(p: vec2f, seed: u32) -> f32 {
 // 128^2: the curl of a potential, which has no divergence: it swirls and never gathers (Bridson 2007). About -1 to 1.
 @compute @workgroup_size(8, 8)
 fn curl(@builtin(global_invocation_id) id: vec3u) {
-    const SIZE = 128u; // as in noise.rs
-    if any(id.xy >= vec2u(SIZE)) {
+    if any(id.xy >= vec2u(CURL_SIZE)) {
         return;
     }
-    let p = (vec2f(id.xy) + 0.5) / f32(SIZE);
+    let p = (vec2f(id.xy) + 0.5) / f32(CURL_SIZE);
     let seed = params.clouds.seed * 131u + CURL_SALT;
-    const e = 0.5 / f32(SIZE);
+    const e = 0.5 / f32(CURL_SIZE);
     let dx = curl_potential(p + vec2f(e, 0.0), seed) - curl_potential(p - vec2f(e, 0.0), seed);
     let dy = curl_potential(p + vec2f(0.0, e), seed) - curl_potential(p - vec2f(0.0, e), seed);
     // A slope of 5 a tile is about the largest that three octaves from 4 cells up reach.
-    texels_out[id.y * SIZE + id.x] = pack2x16float(vec2f(dy, -dx) / (2.0 * e) / 5.0);
+    texels_out[id.y * CURL_SIZE + id.x] = pack2x16float(vec2f(dy, -dx) / (2.0 * e) / 5.0);
 }
 
 // A volume as half floats of one channel, two in each word.

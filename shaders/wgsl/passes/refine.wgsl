@@ -10,7 +10,7 @@
 #import scene_depth
 
 // Lists the pixels of the lattice.
-@compute @workgroup_size(8, 8)
+@compute @workgroup_size(GRID_GROUP, GRID_GROUP)
 fn list_lattice(@builtin(global_invocation_id) id: vec3u) {
     let last = vec2u(dispatch.march_width, dispatch.sheet_rows) - 1u;
     let size = (last + dispatch.lattice - 1u) / dispatch.lattice + 1u;
@@ -24,7 +24,7 @@ fn list_lattice(@builtin(global_invocation_id) id: vec3u) {
     }
 }
 
-@compute @workgroup_size(8, 8)
+@compute @workgroup_size(GRID_GROUP, GRID_GROUP)
 fn refine(@builtin(global_invocation_id) id: vec3u) {
     let last = vec2u(dispatch.march_width, dispatch.sheet_rows) - 1u;
     if any(id.xy > (last + dispatch.lattice - 1u) / dispatch.lattice) {

@@ -195,7 +195,7 @@ struct Cell {
     tolerance: f32,
 }
 
-@compute @workgroup_size(8, 8)
+@compute @workgroup_size(GRID_GROUP, GRID_GROUP)
 fn reproject(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= dispatch.march_width || id.y * u32(STRIDE) >= dispatch.rows {
         return;
@@ -342,7 +342,7 @@ fn choose() {
 
 // A still as the history of the frames after it. Its coarsest lattice has had rays of their own; between those it is interpolated,
 // or its rays have looked for cloud only where their neighbours have found it (passes/refine).
-@compute @workgroup_size(8, 8)
+@compute @workgroup_size(GRID_GROUP, GRID_GROUP)
 fn begin(@builtin(global_invocation_id) id: vec3u) {
     let size = known_size();
     if any(id.xy >= size) {

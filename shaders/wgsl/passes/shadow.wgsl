@@ -16,7 +16,7 @@ const MOST_PLACES = 16.0;
 // Behind this optical depth is less than a thousandth of the sun.
 const DARK = 7.0;
 
-@compute @workgroup_size(8, 8)
+@compute @workgroup_size(GRID_GROUP, GRID_GROUP)
 fn shadow_map(@builtin(global_invocation_id) id: vec3u) {
     let texel = vec2u(id.x, dispatch.first_row + id.y);
     if id.x >= frame.view.width || id.y >= dispatch.rows {

@@ -97,25 +97,24 @@ fn air_share_bake(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= size.xy) {
         return;
     }
-    const SLICES = 24u; // as in passes/sky.rs
     const STEPS_EACH = 2u;
     let direction = texel_direction(vec2f(id.xy), vec2f(size.xy));
     let way = air_way(direction);
-    var reached: array<vec3f, SLICES>;
+    var reached: array<vec3f, SHARE_SLICES>;
     var light = AirLight(vec3f(0.0), vec3f(0.0));
-    for (var i = 0u; i < SLICES; i++) {
+    for (var i = 0u; i < SHARE_SLICES; i++) {
         reached[i] = light.radiance;
         for (var j = 0u; j < STEPS_EACH; j++) {
             let s = vec3f(f32(STEPS_EACH * i + j)) + vec3f(0.0, 0.5, 1.0);
-            let t = s * s / f32((SLICES - 1u) * STEPS_EACH * (SLICES - 1u) * STEPS_EACH) * way.length;
-            if i + 1u < SLICES {
+            let t = s * s / f32((SHARE_SLICES - 1u) * STEPS_EACH * (SHARE_SLICES - 1u) * STEPS_EACH) * way.length;
+            if i + 1u < SHARE_SLICES {
                 light = air_step(light, direction, way.start + t.y, t.z - t.x);
             }
         }
     }
     let night = select(exp(-light.depth) * params.atmosphere.night, vec3f(0.0), way.grounded);
     let whole = params.sun.irradiance * light.radiance + night;
-    for (var i = 0u; i < SLICES; i++) {
+    for (var i = 0u; i < SHARE_SLICES; i++) {
         let share = select(vec3f(0.0), params.sun.irradiance * reached[i] / max(whole, vec3f(1e-30)), whole > vec3f(1e-20));
         textureStore(volume_out, vec3u(id.xy, i), vec4f(share, 1.0));
     }

@@ -2,12 +2,15 @@
 
 use super::weather::mix;
 use super::{Inputs, Lut, bake_map, load_or_bake, view};
+use crate::constants::constants;
 use crate::error::Result;
 use crate::params::{BroadShares, BroadSource, Edge, Params, Weather};
 use crate::recorder::Recorder;
 
-/// Texels of a baked map's side: it holds nothing smaller than a twelfth of itself.
-const SIZE: u32 = 128;
+constants! {
+    /// Texels of the side of a baked larger map: it holds nothing smaller than a twelfth of itself.
+    const BROAD_SIZE: u32 = 128;
+}
 /// By how many tiles of the smaller map a value of 1 bends it. Measured on the default sky, whose clouds stand 5 km apart: the
 /// tiles next to each other are bent apart by more than that nearly everywhere.
 pub(crate) const BEND: f32 = 0.8;
@@ -55,7 +58,7 @@ fn bake_source(rec: &mut Recorder<'_>, params: &Params, source: &BroadSource) ->
             Ok(texture)
         }
         BroadSource::Seed(seed) => {
-            let texture = rec.gpu.texture("broad_weather", [SIZE, SIZE, 1], 1);
+            let texture = rec.gpu.texture("broad_weather", [BROAD_SIZE, BROAD_SIZE, 1], 1);
             load_or_bake(rec, "broad_weather", "broad_weather", &seed.to_string(), &[&texture], |rec| {
                 let weather = Weather { seed: *seed, ..params.weather.clone() };
                 let alone = Params { weather, ..params.clone() };

@@ -1,9 +1,22 @@
 //! The texture of the high clouds, made again when its shapes have evolved.
 
 use super::{Inputs, Lut, view};
+use crate::constants::constants;
 use crate::error::Result;
+use crate::gpu::COPIED;
 use crate::params;
 use crate::recorder::Recorder;
+
+constants! {
+    /// How many times larger the second read of the high clouds is than the first: no small ratio, so that they do not
+    /// repeat together.
+    pub(crate) const BROAD: f32 = 3.2;
+    /// Updates of an octave of the high clouds after which their numbers come round: all are exact in f32.
+    pub(crate) const UPDATES: u32 = 65_536;
+    /// Sines of the sun's height, 12 and 20 degrees, between which its light goes over from another on each of the high
+    /// clouds in sight to the same on all.
+    pub(crate) const LOW_SUN: [f64; 2] = [0.208, 0.342];
+}
 
 /// What the texture is made from: seed, octaves, stretch, type, size, and the ages and numbers of its updates.
 type Key = (u32, u32, f32, f32, u32, [[f32; 4]; 4]);
@@ -39,7 +52,7 @@ impl HighClouds {
             // composite 24 ms at 1080p on a busy machine, not 16). Such a texture cannot be stored to, so it is filled
             // from a buffer.
             let texture = rec.gpu.flat("high_clouds", [size; 2], wgpu::TextureFormat::R16Float);
-            let texels = rec.gpu.buffer("high_clouds", u64::from(2 * size.next_multiple_of(128) * size));
+            let texels = rec.gpu.buffer("high_clouds", u64::from((2 * size).next_multiple_of(COPIED) * size));
             let out = vec![("texels_out", (&texels).into())];
             rec.dispatch(("high_clouds", kernel(high)), out, [size.div_ceil(2), size, 1]);
             rec.fill(&texture, 0, &texels);

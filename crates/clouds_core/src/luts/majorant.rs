@@ -2,12 +2,15 @@
 
 use super::volume::Grid;
 use super::{Inputs, Lut, view, weather};
+use crate::constants::constants;
 use crate::error::Result;
 use crate::params::{self, BroadShares, Edge, Model};
 use crate::recorder::Recorder;
 
-/// Voxels along the side of a cell (as in majorant.wgsl).
-const BRICK: usize = 4;
+constants! {
+    /// Voxels of the user's grid along the side of a cell.
+    const BRICK: usize = 4;
+}
 /// Most cells along a side of the weather map, and their height between the lowest and the highest clouds, m.
 const CELLS: u32 = 64;
 const CELL_HEIGHT: f32 = 125.0;

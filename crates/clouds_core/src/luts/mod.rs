@@ -102,7 +102,7 @@ pub(crate) struct Luts {
 
 impl Luts {
     pub fn new(gpu: &Gpu) -> Self {
-        let side = blue_noise::SIZE as u32;
+        let side = blue_noise::BLUE_SIZE as u32;
         let texture = gpu.texture("blue_noise", [side, side, 1], 1);
         let texels: Vec<_> = blue_noise::TILE.iter().map(|v| [half::f16::from_f32(*v); 4]).collect();
         gpu.write_texture(&texture, &texels);
@@ -153,6 +153,9 @@ impl Luts {
         self.weather.texture(rec, params)
     }
 }
+
+/// Maps that a kernel adds up, by name.
+const MIXED: [&str; 4] = ["mix_a", "mix_b", "mix_c", "mix_d"];
 
 /// The uniform block of parameters.
 pub(crate) fn params_block(params: &Params, quality: &Quality) -> Binding {

@@ -1,15 +1,23 @@
 //! The light that air and ground have scattered, by altitude and the height of the sun.
 
-use super::{Inputs, Lut, load_or_bake, transmittance, view};
+use super::{Inputs, Lut, MIXED, load_or_bake, transmittance, view};
+use crate::constants::constants;
 use crate::error::Result;
 use crate::kernel::Bindings;
 use crate::params;
 use crate::recorder::Recorder;
 
-/// Texels: cosine of the sun's angle with the zenith, altitude in each of six tables (as in atmosphere.wgsl).
-const SIZE: [u32; 3] = [64, 6 * 24, 1];
-/// Orders of scattering; the last stands for all that follow (as in passes/multiscatter.wgsl).
-const ORDERS: usize = 4;
+constants! {
+    /// Tables of the light that has been scattered, one below the other (`SCATTERED` to `FLUX_SUNWARD`).
+    const TABLES: u32 = 6;
+    /// Texels across one of these tables: the cosine of the sun's angle with the zenith.
+    const TABLE_COSINES: u32 = 64;
+    /// Texels down one of these tables: altitude.
+    const TABLE_ALTITUDES: u32 = 24;
+}
+
+/// Texels of all tables.
+const SIZE: [u32; 3] = [TABLE_COSINES, TABLES * TABLE_ALTITUDES, 1];
 
 /// The tables on the GPU.
 #[derive(Default)]
@@ -32,8 +40,9 @@ impl Multiscatter {
 }
 
 fn bake(rec: &mut Recorder<'_>, sum: &wgpu::Texture) {
-    let orders: Vec<_> = (0..ORDERS).map(|_| view(&rec.gpu.texture("air_light_order", SIZE, 1))).collect();
-    let table = [SIZE[0], SIZE[1] / 6, 1];
+    // Of as many orders as are added up; the last stands for all that follow.
+    let orders = MIXED.map(|_| view(&rec.gpu.texture("air_light_order", SIZE, 1)));
+    let table = [TABLE_COSINES, TABLE_ALTITUDES, 1];
     let next = |before: &wgpu::TextureView, out: &wgpu::TextureView| -> Bindings {
         vec![("mix_a", before.into()), ("map_out", out.into())]
     };
@@ -42,7 +51,7 @@ fn bake(rec: &mut Recorder<'_>, sum: &wgpu::Texture) {
     for (before, out) in orders.iter().zip(&orders[1..]) {
         rec.dispatch(("multiscatter", "next_order"), next(before, out), table);
     }
-    let [a, b, c, d] = [0, 1, 2, 3].map(|order: usize| (&orders[order]).into());
-    let bindings = vec![("mix_a", a), ("mix_b", b), ("mix_c", c), ("mix_d", d), ("map_out", (&view(sum)).into())];
+    let mut bindings: Bindings = MIXED.into_iter().zip(&orders).map(|(name, order)| (name, order.into())).collect();
+    bindings.push(("map_out", (&view(sum)).into()));
     rec.dispatch(("multiscatter", "sum_orders"), bindings, SIZE);
 }

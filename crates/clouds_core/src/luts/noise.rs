@@ -3,20 +3,24 @@
 use std::sync::{Arc, Mutex};
 
 use super::{Inputs, load_or_bake, view};
+use crate::constants::constants;
 use crate::error::Result;
-use crate::gpu::{Gpu, lock};
+use crate::gpu::{COPIED, Gpu, lock};
 use crate::kernel::Bindings;
 use crate::params;
 use crate::recorder::{Recorder, Token};
 
-/// Texels of the base shape's side (nubis2015).
-const SHAPE_SIZE: u32 = 128;
-/// Texels of the detail's side (nubis2015).
-const DETAIL_SIZE: u32 = 32;
-/// How much smaller the finer detail is that is added to it (as in bindings.wgsl).
-const FINER: u32 = 5;
-/// Texels of the curl noise's side (nubis2015).
-const CURL_SIZE: u32 = 128;
+constants! {
+    /// Texels of the base shape's side (nubis2015).
+    const SHAPE_SIZE: u32 = 128;
+    /// Texels of the detail's side (nubis2015).
+    const DETAIL_SIZE: u32 = 32;
+    /// How many times smaller than the detail the finer one is that is added to it: a whole number, so that its tiles
+    /// fill that of the detail.
+    const FINER: u32 = 5;
+    /// Texels of the curl noise's side (nubis2015).
+    const CURL_SIZE: u32 = 128;
+}
 
 /// The noises of a renderer.
 #[derive(Default)]
@@ -125,7 +129,7 @@ fn bake_volume(rec: &mut Recorder<'_>, entry: &'static str, reads: Bindings, tar
     }
     for level in 0..texture.mip_level_count() {
         let size = size >> level;
-        let texels = rec.gpu.buffer("packed", u64::from(2 * size.next_multiple_of(128) * size * size));
+        let texels = rec.gpu.buffer("packed", u64::from((2 * size).next_multiple_of(COPIED) * size * size));
         let bindings = vec![("volume_in", (&mip(level)).into()), ("texels_out", (&texels).into())];
         rec.dispatch(("noise", "pack"), bindings, [size.div_ceil(2), size, size]);
         rec.fill(target, level, &texels);

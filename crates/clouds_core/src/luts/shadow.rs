@@ -7,6 +7,7 @@ use super::volume::Grid;
 use super::{Inputs, Lut, view};
 use crate::camera::Camera;
 use crate::clipmap::{Casters, Origin, casters};
+use crate::constants::constants;
 use crate::error::Result;
 use crate::frame::Frame;
 use crate::params::Params;
@@ -14,9 +15,12 @@ use crate::recorder::Recorder;
 use crate::uniforms::Dispatch;
 use crate::wind::Carried;
 
-/// Texels across a level, and levels (as in ground_shadow.wgsl).
-const SIDE: u32 = 88;
-const LEVELS: u32 = 5;
+constants! {
+    /// Texels across a level of the shadows on the ground.
+    const SHADOW_SIDE: u32 = 88;
+    /// Levels of them, each twice as wide and coarse as the one before.
+    const SHADOW_LEVELS: u32 = 5;
+}
 /// The side of a texel of the finest level, m, for eyes up to so high; twice as long for each doubling of the altitude, as
 /// pixels are. The sun's half degree blurs shadows of clouds 3 km up by 28 m.
 const TEXEL: f32 = 64.0;
@@ -75,7 +79,7 @@ impl GroundShadow {
         }
         let levels = self.lut.update(rec, key(inputs), |rec| {
             let origin = origin(eye, params, time);
-            let size = [SIDE, SIDE * LEVELS, 1];
+            let size = [SHADOW_SIDE, SHADOW_SIDE * SHADOW_LEVELS, 1];
             let [single, mean, levels] = [("", size), ("ground_shadow_mean", [1; 3]), ("ground_shadow", size)]
                 .map(|(label, size)| view(&rec.gpu.texture(label, size, 1)));
             let mut there = Frame::new(&Camera::equirect(origin.place.extend(0.0))?, params, origin.time, [1, 1]);
@@ -87,7 +91,7 @@ impl GroundShadow {
                 rec.dispatch(("shadow", entry), ours.concat(), size);
             };
             bake("shadow_ground", &[], &single, size);
-            bake("shadow_mean", std::slice::from_ref(&made), &mean, [SIDE, 1, 1]);
+            bake("shadow_mean", std::slice::from_ref(&made), &mean, [SHADOW_SIDE, 1, 1]);
             bake("shadow_blend", &[made, of_all], &levels, size);
             Ok(levels)
         })?;

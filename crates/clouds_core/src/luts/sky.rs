@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use super::{Inputs, Lut, transmittance, view};
 use crate::camera::Camera;
+use crate::constants::constants;
 use crate::error::Result;
 use crate::frame::Frame;
 use crate::params::{self, Params};
@@ -12,8 +13,13 @@ use crate::recorder::Recorder;
 /// Texels of the sky map: azimuth from the sun, angle from the horizon.
 const SIZE: [u32; 3] = [128, 160, 1];
 
-/// Texels of the shares of the sky before a distance: azimuth, angle, distance (as in passes/sky.wgsl).
-const SHARE_SIZE: [u32; 3] = [32, 64, 24];
+constants! {
+    /// Distances at which the shares of the sky before them are known.
+    const SHARE_SLICES: u32 = 24;
+}
+
+/// Texels of those shares: azimuth, angle, distance.
+const SHARE_SIZE: [u32; 3] = [32, 64, SHARE_SLICES];
 
 /// What the sky is made from: sun, air, night, where it is seen from, and where the clouds are that it lights.
 type Key = (params::Sun, params::Atmosphere, [f32; 3], [f64; 3], [f32; 3]);

@@ -1,18 +1,19 @@
 //! The weather map: baked from noise, the user's own, or a mixture of such maps.
 
-use super::{Inputs, Lut, bake_map, load_or_bake, view};
+use super::{Inputs, Lut, MIXED, bake_map, load_or_bake, view};
+use crate::constants::constants;
 use crate::error::Result;
 use crate::gpu::Gpu;
-use crate::kernel::Binding;
+use crate::kernel::{Binding, Bindings};
 use crate::params::{self, Edge, Params};
 use crate::recorder::{Recorder, Token};
 use crate::schema::Map;
 use crate::specialization;
 
-/// Texels of a baked map's side (nubis2015).
-const SIZE: u32 = 512;
-/// Maps that are mixed at once (as in passes/weather.wgsl).
-const MIXED: usize = 4;
+constants! {
+    /// Texels of the side of a baked weather map (nubis2015).
+    const WEATHER_SIZE: u32 = 512;
+}
 
 /// Width and height of the map in texels: of a mixture the largest of each.
 pub(crate) fn size(params: &Params) -> [u32; 2] {
@@ -21,7 +22,7 @@ pub(crate) fn size(params: &Params) -> [u32; 2] {
 }
 
 fn size_of(weather: &params::Weather) -> [u32; 2] {
-    weather.map.as_ref().map_or([SIZE; 2], |map| [map.width as u32, map.height as u32])
+    weather.map.as_ref().map_or([WEATHER_SIZE; 2], |map| [map.width as u32, map.height as u32])
 }
 
 /// A map on the GPU.
@@ -93,7 +94,7 @@ fn bake_source(rec: &mut Recorder<'_>, params: &Params, weather: &params::Weathe
     if let Some(map) = &weather.map {
         return Ok(upload(rec.gpu, map));
     }
-    let texture = rec.gpu.texture("weather", [SIZE, SIZE, 1], 1);
+    let texture = rec.gpu.texture("weather", [WEATHER_SIZE, WEATHER_SIZE, 1], 1);
     load_or_bake(rec, "weather", "weather", &format!("{weather:?}"), &[&texture], |rec| {
         let noise = ("WEATHER_NOISE", f64::from(weather.noise as u32));
         let usual = rec.specialize(specialization::of_bakes().with(&[noise]));
@@ -123,9 +124,9 @@ pub(crate) fn mix(
     let mut sum = first.clone();
     // The sum so far and three more at a time.
     while !rest.is_empty() {
-        let (some, others) = rest.split_at(rest.len().min(MIXED - 1));
+        let (some, others) = rest.split_at(rest.len().min(MIXED.len() - 1));
         rest = others;
-        let mut shares = [0.0_f32; MIXED];
+        let mut shares = [0.0_f32; MIXED.len()];
         let mut views = Vec::new();
         for (index, (texture, share)) in std::iter::once(&sum).chain(some).enumerate() {
             shares[index] = *share;
@@ -133,15 +134,12 @@ pub(crate) fn mix(
         }
         let source = |index: usize| views.get(index).unwrap_or(&views[0]).into();
         let texture = rec.gpu.texture("weather", [width, height, 1], 1);
-        let bindings = vec![
-            ("mix_a", source(0)),
-            ("mix_b", source(1)),
-            ("mix_c", source(2)),
-            ("mix_d", source(3)),
+        let mut bindings: Bindings = MIXED.into_iter().enumerate().map(|(i, name)| (name, source(i))).collect();
+        bindings.extend([
             ("mix_shares", Binding::block(&shares.map(f32::to_bits))),
             ("weather_sampler", sampler(rec.gpu, edge).into()),
             ("map_out", (&view(&texture)).into()),
-        ];
+        ]);
         rec.dispatch(("weather", "weather_mix"), bindings, [width, height, 1]);
         sum = (texture, 1.0);
     }

@@ -1,16 +1,13 @@
 //! The clouds before the sky: what the caller gets.
 
 use super::march::Marched;
-use super::refine::{COARSEST, Refined, WIDEST};
+use super::refine::{Refined, TILE, WIDEST};
 use crate::frame::Frame;
 use crate::gpu::Gpu;
 use crate::kernel::Bindings;
 use crate::params::{Params, Quality};
 use crate::recorder::Recorder;
 use crate::uniforms::Dispatch;
-
-/// Pixels of a cell in each direction (as in lattice.wgsl).
-pub(crate) const TILE: u32 = COARSEST;
 
 /// Share of the cells that are not smooth as a rule.
 const ROUGH: f64 = 0.3;

@@ -4,21 +4,25 @@ use std::f32::consts::PI;
 
 use super::march::Marched;
 use crate::camera::Camera;
+use crate::constants::constants;
 use crate::frame::Frame;
 use crate::gpu::Gpu;
 use crate::kernel::Bindings;
 use crate::params::Quality;
 use crate::recorder::{List, Recorder};
 
-/// Distance of the pixels that are marched first, at most: in pixels, and as an angle, radians. Clouds are lost between
-/// rays farther apart: at 1.3 degrees `fair_weather` errs by 11 %, at a third of one by 3 % (contrast 0.1).
-pub(crate) const COARSEST: u32 = 4;
+constants! {
+    /// Pixels from one corner of a cell to the next: the distance of the pixels that are marched first, at most.
+    pub(crate) const TILE: u32 = 4;
+}
+/// The same distance as an angle, radians. Clouds are lost between rays farther apart: at 1.3 degrees `fair_weather`
+/// errs by 11 %, at a third of one by 3 % (contrast 0.1).
 pub(crate) const WIDEST: f32 = 0.5 * PI / 180.0;
 
 /// Whether the pixels of that lattice are all that is ever marched: where no contrast is too large to interpolate, and no scene of the
 /// user's has edges. The rest of the picture is interpolated where it is composed (composite.wgsl), cell by cell.
 pub(crate) fn is_sparse(frame: &Frame, quality: &Quality) -> bool {
-    quality.contrast >= 1.0 && !frame.scene && coarsest(frame, quality) == COARSEST
+    quality.contrast >= 1.0 && !frame.scene && coarsest(frame, quality) == TILE
 }
 
 impl Quality {
@@ -29,14 +33,14 @@ impl Quality {
     }
 }
 
-/// How many pixels of a picture, or of a sheet, the clouds are known at (as in lattice.wgsl).
+/// How many pixels of a picture, or of a sheet, the clouds are known at.
 pub(crate) fn known(size: [u32; 2], sparse: bool) -> [u32; 2] {
-    if sparse { size.map(|pixels| pixels.div_ceil(COARSEST) + 1) } else { size }
+    if sparse { size.map(|pixels| pixels.div_ceil(TILE) + 1) } else { size }
 }
 
 /// Pixels from one of those to the next.
 pub(crate) fn spacing(sparse: bool) -> u32 {
-    if sparse { COARSEST } else { 1 }
+    if sparse { TILE } else { 1 }
 }
 
 /// The pixels to be marched next.
@@ -90,7 +94,7 @@ pub(crate) fn is_needed(frame: &Frame, quality: &Quality) -> bool {
 /// The distance to begin with; 1 marches every pixel.
 pub(crate) fn coarsest(frame: &Frame, quality: &Quality) -> u32 {
     let fits = |n: &u32| quality.contrast > 0.0 && *n as f32 * frame.marched_angle() <= WIDEST;
-    [COARSEST, 2].into_iter().find(fits).unwrap_or(1)
+    [TILE, 2].into_iter().find(fits).unwrap_or(1)
 }
 
 /// Lists the pixels of the lattice of `frame`.

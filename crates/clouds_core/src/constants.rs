@@ -1,0 +1,148 @@
+//! Constants that Rust and WGSL share. Each is declared once, in the module that owns its meaning, and written into the
+//! WGSL module `constants` when shaders are linked.
+
+use crate::luts::{broad_weather, high_clouds, majorant, multiscatter, noise, shadow, sky, weather};
+use crate::passes::refine;
+use crate::{blue_noise, camera, color, frame, gpu, moon, params, recorder, scene_depth};
+
+/// Declares constants of a module for Rust, and for WGSL by the same names. Their documentation has unit and source.
+macro_rules! constants {
+    ($($(#[doc = $doc:literal])+ $vis:vis const $name:ident: $ty:ty = $value:expr;)+) => {
+        $($(#[doc = $doc])+ $vis const $name: $ty = $value;)+
+
+        /// The constants of this module in WGSL.
+        pub(crate) fn constants() -> String {
+            [$($crate::constants::declaration(stringify!($name), concat!($($doc),+), &$name)),+].concat()
+        }
+    };
+}
+pub(crate) use constants;
+
+/// The WGSL module `constants`. A module that is missing here breaks the shaders that read its constants.
+pub(crate) fn source() -> String {
+    let modules = [
+        blue_noise::constants,
+        broad_weather::constants,
+        camera::constants,
+        color::constants,
+        frame::constants,
+        gpu::constants,
+        high_clouds::constants,
+        majorant::constants,
+        moon::constants,
+        multiscatter::constants,
+        noise::constants,
+        params::constants,
+        recorder::constants,
+        refine::constants,
+        scene_depth::constants,
+        shadow::constants,
+        sky::constants,
+        weather::constants,
+    ];
+    modules.map(|constants| constants()).concat()
+}
+
+/// A constant in WGSL.
+pub(crate) fn declaration(name: &str, doc: &str, value: &impl Shared) -> String {
+    format!("const {name}: {} = {}; //{doc}\n", value.wgsl_type(), value.wgsl())
+}
+
+/// A type that constants of both languages have.
+pub(crate) trait Shared {
+    /// The type in WGSL.
+    fn wgsl_type(&self) -> String;
+    /// The value in WGSL.
+    fn wgsl(&self) -> String;
+}
+
+impl Shared for f32 {
+    fn wgsl_type(&self) -> String {
+        "f32".into()
+    }
+    fn wgsl(&self) -> String {
+        // The fewest digits that are read back as the same bits.
+        format!("{self:?}")
+    }
+}
+
+/// What Rust works out in f64 is rounded for WGSL, as naga rounds a number without a type.
+impl Shared for f64 {
+    fn wgsl_type(&self) -> String {
+        "f32".into()
+    }
+    fn wgsl(&self) -> String {
+        (*self as f32).wgsl()
+    }
+}
+
+/// Whole numbers, whatever Rust counts with them.
+macro_rules! whole {
+    ($($ty:ty),+) => { $(
+        impl Shared for $ty {
+            fn wgsl_type(&self) -> String {
+                "u32".into()
+            }
+            fn wgsl(&self) -> String {
+                format!("{self}u")
+            }
+        }
+    )+ };
+}
+whole!(u32, u64, usize);
+
+/// Vectors.
+macro_rules! vectors {
+    ($($ty:ty),+) => { $(
+        impl<const N: usize> Shared for [$ty; N] {
+            fn wgsl_type(&self) -> String {
+                format!("vec{N}f")
+            }
+            fn wgsl(&self) -> String {
+                format!("vec{N}f({})", self.map(|v| v.wgsl()).join(", "))
+            }
+        }
+    )+ };
+}
+vectors!(f32, f64);
+
+/// A matrix by rows; WGSL has its columns.
+impl Shared for [[f32; 3]; 3] {
+    fn wgsl_type(&self) -> String {
+        "mat3x3f".into()
+    }
+    fn wgsl(&self) -> String {
+        let column = |i: usize| self.map(|row| row[i]).wgsl();
+        format!("mat3x3f({})", [0, 1, 2].map(column).join(", "))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_read_back_as_the_same_bits() {
+        let awkward = [0.1, 1e30, 4.0e-45, f32::MAX, f32::MIN_POSITIVE, 0.004_654, -12.473_93, 16_777_217.0];
+        for number in awkward {
+            assert_eq!(number.wgsl().parse().map(f32::to_bits), Ok(number.to_bits()));
+        }
+    }
+
+    #[test]
+    fn wgsl_has_the_values_of_rust() {
+        let code = source();
+        for line in [
+            "const AIR_TOP: f32 = 100000.0;",
+            "const MOON_RADIUS: f32 = 0.00452;",
+            "const NO_SCENE: f32 = 1e30;",
+            "const BRICK: u32 = 4u;",
+            "const LUMINANCE: vec3f = vec3f(0.2126, 0.7152, 0.0722);",
+        ] {
+            assert!(code.contains(line), "{line}\n{code}");
+        }
+        let rows = [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0], [7.0, 8.0, 9.0]];
+        let columns = "mat3x3f(vec3f(1.0, 4.0, 7.0), vec3f(2.0, 5.0, 8.0), vec3f(3.0, 6.0, 9.0))";
+        assert_eq!(rows.wgsl(), columns);
+    }
+}

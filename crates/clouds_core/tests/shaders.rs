@@ -29,20 +29,29 @@ fn every_shader_opens_with_a_sentence() {
     }
 }
 
-/// The name that a line of WGSL declares as a constant, maybe within a function.
-fn declared(line: &str) -> Option<&str> {
-    let rest = line.trim_start().strip_prefix("const ")?;
-    Some(rest.split([':', '=', ' ']).next().unwrap_or(rest))
+fn is_word(c: char) -> bool {
+    c.is_alphanumeric() || c == '_'
+}
+
+/// The words of WGSL without its comments.
+fn words(source: &str) -> impl Iterator<Item = &str> {
+    let code = source.lines().filter_map(|line| line.split("//").next());
+    code.flat_map(|code| code.split(|c| !is_word(c))).filter(|word| !word.is_empty())
+}
+
+/// The constants that WGSL declares, in functions too.
+fn declared(source: &str) -> BTreeSet<&str> {
+    words(source).zip(words(source).skip(1)).filter(|(before, _)| *before == "const").map(|(_, name)| name).collect()
 }
 
 #[test]
 fn no_shader_declares_a_constant_of_rust_again() {
     let generated = shader::read("constants").expect("is generated");
-    let shared: BTreeSet<_> = generated.lines().filter_map(declared).collect();
+    let shared = declared(&generated);
     assert!(shared.contains("AIR_TOP") && shared.len() == generated.lines().count(), "{generated}");
     for name in shader::names() {
         let source = shader::read(name).expect("listed");
-        let again: Vec<_> = source.lines().filter_map(declared).filter(|name| shared.contains(name)).collect();
+        let again: Vec<_> = declared(&source).intersection(&shared).copied().collect();
         assert!(again.is_empty(), "shaders/wgsl/{name}.wgsl declares {again:?}, which Rust does");
     }
 }
@@ -52,9 +61,8 @@ fn no_shader_declares_a_constant_of_rust_again() {
 fn shaders_read_each_constant_of_rust() {
     let generated = shader::read("constants").expect("is generated");
     let sources: Vec<_> = shader::names().map(|name| shader::read(name).expect("listed")).collect();
-    let is_word = |c: char| c.is_alphanumeric() || c == '_';
-    let words: BTreeSet<_> = sources.iter().flat_map(|source| source.split(|c| !is_word(c))).collect();
-    let unread: Vec<_> = generated.lines().filter_map(declared).filter(|name| !words.contains(name)).collect();
+    let read: BTreeSet<_> = sources.iter().flat_map(|source| words(source)).collect();
+    let unread: Vec<_> = declared(&generated).difference(&read).copied().collect();
     assert!(unread.is_empty(), "{unread:?}");
 }
 

@@ -50,8 +50,8 @@ fn majorant_weather(@builtin(global_invocation_id) id: vec3u) {
     }
     let wettest = weather_from_map(most);
     let driest = weather_from_map(least);
-    let heights = vec2f(f32(id.z), f32(id.z + 1u)) / f32(size.z);
-    let altitudes = mix(vec2f(frame.sky.shell_base), vec2f(frame.sky.shell_top), heights);
+    let part = vec2f(f32(id.z), f32(id.z + 1u)) / f32(size.z);
+    let altitudes = mix(vec2f(frame.sky.shell_base), vec2f(frame.sky.shell_top), part);
     let base = params.clouds.base;
     // From the lowest that the lower side of the cell can be in its cloud to the highest that its upper side can.
     let heights = vec2f(

@@ -2,7 +2,7 @@
 
 use std::sync::LazyLock;
 
-use crate::constants::constants;
+use crate::shared::constants;
 
 /// The tile, made once in a process.
 pub static TILE: LazyLock<Vec<f32>> = LazyLock::new(tile);

@@ -5,8 +5,8 @@
 
 use glam::DVec3;
 
-use crate::constants::constants;
 use crate::error::{Error, Result};
+use crate::shared::constants;
 
 /// How pixels become directions. WGSL has the discriminants.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -6,10 +6,19 @@
 use glam::{DVec2, DVec3};
 
 use crate::params::{self, Params};
-use crate::wind::fastest;
+use crate::wind::{Carried, fastest};
 
 /// Side of the grid of places, m: a tenth of the finest level of the ground's shadows (passes/shadow.rs).
 const EYE_STEP: f64 = 600.0;
+
+/// The side of a texel of the finest level, m, for eyes up to so high; twice as long for each doubling of the altitude, as
+/// pixels are. The sun's half degree blurs shadows of clouds 3 km up by 28 m.
+const TEXEL: f32 = 64.0;
+const TEXEL_ALTITUDE: f32 = 12_000.0;
+
+/// The clouds may move so far while the shadows stay, m: half a texel, and a power of two, so that where winds have come
+/// round after times that are powers of two, shadows have too.
+const CLOUD_STEP: f64 = 32.0;
 
 /// What casts shadows, and where: the sun's place, clouds, weather and wind.
 pub(crate) type Casters = (
@@ -47,4 +56,24 @@ impl Origin {
         let steps = [place.x as i64, place.y as i64, (time / period).floor() as i64];
         Self { steps, place: EYE_STEP * place, time: period * (time / period).floor() }
     }
+}
+
+/// From where and when a picture's shadows are baked: the user's grid stays where it is.
+pub(crate) fn origin(eye: DVec3, params: &Params, time: f64) -> Origin {
+    Origin::new(eye, params, if params.volume.is_some() { 0.0 } else { time }, CLOUD_STEP)
+}
+
+/// Where the eye is in the levels of its picture.
+pub(crate) fn eye_in(eye: DVec3, params: &Params, time: f64) -> [f32; 2] {
+    let origin = origin(eye, params, time);
+    let drift = match params.volume {
+        Some(_) => DVec2::ZERO,
+        None => Carried::new(params, origin.time, time).drift().truncate(),
+    };
+    (eye.truncate() - origin.place - drift).as_vec2().to_array()
+}
+
+/// The side of a texel of the finest level for an eye at an altitude, m.
+pub(crate) fn texel(altitude: f32) -> f32 {
+    TEXEL * (altitude / TEXEL_ALTITUDE).max(1.0).log2().floor().exp2()
 }

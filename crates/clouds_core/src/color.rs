@@ -1,8 +1,8 @@
 //! From scene-linear Rec. 709 radiance to sRGB pixels: the only place where anything is clipped or gamma-encoded.
 
 use crate::blue_noise::{self, BLUE_SIZE};
-use crate::constants::constants;
 use crate::error::{Error, Result};
+use crate::shared::constants;
 
 /// The tone maps by name.
 pub const TONE_MAPS: [&str; 3] = ["agx", "aces", "none"];

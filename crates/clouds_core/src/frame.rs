@@ -7,14 +7,15 @@ use std::f64::consts::{FRAC_PI_2, PI as PI64};
 use glam::{DVec2, DVec3, Vec3};
 
 use crate::camera::{Camera, Projection};
-use crate::constants::constants;
+use crate::clipmap;
+use crate::directions::{compass, sun_direction};
+use crate::gpu::Binding;
 use crate::gpu::Gpu;
-use crate::kernel::Binding;
-use crate::luts::{broad_weather, high_clouds, shadow};
+use crate::grid;
 use crate::moon::MOON_RADIUS;
 use crate::params;
 use crate::params::{Edge, Model, Params, Phase};
-use crate::passes::refine;
+use crate::shared::constants;
 use crate::uniforms::{Dispatch, Sky, View, uniform};
 use crate::wind::Carried;
 
@@ -61,10 +62,24 @@ constants! {
     /// Least that the chart's scale is the planet's diameter over, planet radii: nearer to the antipode of the origin,
     /// from 172 degrees on, the chart would have no end.
     const CHART_END: f64 = 0.01;
+    /// How many times larger the second read of the high clouds is than the first: no small ratio, so that they do not
+    /// repeat together.
+    const BROAD: f32 = 3.2;
+    /// Updates of an octave of the high clouds after which their numbers come round: all are exact in f32.
+    const UPDATES: u32 = 65_536;
+    /// Sines of the sun's height, 12 and 20 degrees, between which its light goes over from another on each of the high
+    /// clouds in sight to the same on all.
+    const LOW_SUN: [f64; 2] = [0.208, 0.342];
 }
 
 /// What the sun's half width and f32 may add to its height, radians.
 const HALF_SUN: f64 = SUN_EDGE + 0.001;
+
+/// By how many tiles of the smaller map a value of 1 bends it. Measured on the default sky, whose clouds stand 5 km apart: the
+/// tiles next to each other are bent apart by more than that nearly everywhere.
+const BEND: f32 = 0.8;
+/// The steepest that a baked value changes, for each width of the map.
+const STEEPEST: f64 = 40.0;
 
 /// Speed of falling rain, m/s: of drops of 2.5 mm (Gunn and Kinzer 1949).
 const RAIN_SPEED: f64 = 7.4;
@@ -98,31 +113,6 @@ fn phase_width(params: &Params) -> f32 {
         Phase::Droplet => peak(droplet(f64::from(light.droplet_diameter))[0] as f32),
         // Half a ring of the glory, or of the aureole: light of 0.55 µm on a disc as wide as the droplet.
         Phase::Mie => 0.5 * 0.55 / light.droplet_diameter,
-    }
-}
-
-/// The unit vector toward the sun.
-pub fn sun_direction(params: &Params) -> DVec3 {
-    direction_to(params.sun.elevation, params.sun.azimuth)
-}
-
-/// The unit vector toward a height over the horizon and a compass direction, degrees.
-pub(crate) fn direction_to(elevation: f32, azimuth: f32) -> DVec3 {
-    let (elevation, azimuth) = (f64::from(elevation), f64::from(azimuth));
-    let level = compass(azimuth) * elevation.to_radians().cos();
-    DVec3::new(level.x, level.y, elevation.to_radians().sin())
-}
-
-/// The unit vector toward a compass direction in degrees, clockwise from north.
-pub(crate) fn compass(degrees: f64) -> DVec2 {
-    // Quarter turns are exact, so that a wind to the east does not blow north by 1e-16 of its way.
-    let quarters = (degrees / 90.0).round();
-    let (sin, cos) = (degrees - 90.0 * quarters).to_radians().sin_cos();
-    match quarters.rem_euclid(4.0) as u32 {
-        0 => DVec2::new(sin, cos),
-        1 => DVec2::new(cos, -sin),
-        2 => DVec2::new(-sin, -cos),
-        _ => DVec2::new(-cos, sin),
     }
 }
 
@@ -199,8 +189,8 @@ impl Frame {
         frame.set_wind(camera.eye, params, time);
         frame.set_volume(camera.eye, params);
         frame.sky.leap_scale = leap_scale(params);
-        frame.sky.shadow_texel = shadow::texel(frame.view.altitude);
-        frame.sky.shadow_eye = shadow::eye_in(camera.eye, params, time);
+        frame.sky.shadow_texel = clipmap::texel(frame.view.altitude);
+        frame.sky.shadow_eye = clipmap::eye_in(camera.eye, params, time);
         frame.high_clouds = params.has_high_clouds();
         frame.sky.sun_direction = sun_direction(params).as_vec3().to_array();
         frame.set_high_sun(params);
@@ -330,19 +320,19 @@ impl Frame {
     pub fn has_subrays(&self) -> bool {
         // The farthest of them that the eye can see.
         let away = self.view.power_top.max(0.0).sqrt();
-        let pixel = self.pixel_angle() * refine::spacing(self.sparse) as f32;
+        let pixel = self.pixel_angle() * grid::spacing(self.sparse) as f32;
         self.view.altitude > self.sky.shell_top && away * pixel > CLOUD_WIDTH * self.sky.leap_scale
     }
 
     /// How many pixels of the whole picture the clouds are known at, across and down (lattice.wgsl).
     pub fn known(&self) -> [u32; 2] {
-        refine::known([self.view.width, self.view.height], self.sparse)
+        grid::known([self.view.width, self.view.height], self.sparse)
     }
 
     /// The same for the march of a sheet: of all its pixels, or of those that its clouds are known at.
     pub fn of_known(&self) -> Self {
-        let [march_width, sheet_rows] = refine::known([self.view.width, self.dispatch.sheet_rows], self.sparse);
-        let stride = refine::spacing(self.sparse);
+        let [march_width, sheet_rows] = grid::known([self.view.width, self.dispatch.sheet_rows], self.sparse);
+        let stride = grid::spacing(self.sparse);
         let sheet_row = self.dispatch.sheet_row / stride;
         let dispatch = Dispatch { stride, march_width, sheet_row, sheet_rows, ..self.dispatch.clone() };
         Self { dispatch, ..self.clone() }
@@ -410,7 +400,7 @@ impl Frame {
     fn set_high_sun(&mut self, params: &Params) {
         let up = self.sun_above(params, f64::from(params.high_clouds.altitude));
         self.high_emboss = up && params.high_clouds.emboss > 0.0;
-        self.high_low_sun = self.sun_sine() < high_clouds::LOW_SUN[1];
+        self.high_low_sun = self.sun_sine() < LOW_SUN[1];
     }
 
     /// Sine of the sun's height at the eye.
@@ -547,9 +537,9 @@ impl Frame {
         let shares = params.broad_shares();
         self.sky.broad_most = 0.5 * shares.total;
         self.sky.broad_scale = shares.total;
-        self.sky.broad_bend = broad_weather::BEND * shares.bend * self.sky.broad_scale;
-        let ways = f64::from(broad_weather::BEND * params.weather.extent / params.weather.broad_extent);
-        self.sky.broad_stretch = (ways * broad_weather::STEEPEST) as f32;
+        self.sky.broad_bend = BEND * shares.bend * self.sky.broad_scale;
+        let ways = f64::from(BEND * params.weather.extent / params.weather.broad_extent);
+        self.sky.broad_stretch = (ways * STEEPEST) as f32;
         let fallen = RAIN_SPEED * time / RAIN_STRETCH;
         self.sky.rain_fall = wrap(fallen, clouds.shape_scale) * clouds.shape_scale;
         self.set_upper_wind(eye, params, &carried);
@@ -562,7 +552,7 @@ impl Frame {
         let across = DVec2::new(-along.y, along.x);
         let at = DVec2::new(eye.dot(along), eye.dot(across)) - carried.high;
         self.sky.high_origin = plane(at, high.scale);
-        self.sky.high_broad_origin = plane(at, high_clouds::BROAD * high.scale);
+        self.sky.high_broad_origin = plane(at, BROAD * high.scale);
         self.sky.high_direction = along.as_vec2().to_array();
         // In steps of a 256th of the smallest octave's life, which change no pixel by more than four thousandths: a new
         // texture in every frame would take longer than all else that is baked.
@@ -570,7 +560,7 @@ impl Frame {
         let time = if step.is_finite() { (time / step).round() * step } else { time };
         for octave in 0..8 {
             let updates = (time * f64::from(high.evolution) + params.drift.evolution) * f64::from(1u32 << octave);
-            let number = updates.floor().rem_euclid(f64::from(high_clouds::UPDATES)) as f32;
+            let number = updates.floor().rem_euclid(f64::from(UPDATES)) as f32;
             let age = (updates - updates.floor()) as f32;
             let (numbers, ages) = if octave < 4 {
                 (&mut self.sky.high_update, &mut self.sky.high_age)

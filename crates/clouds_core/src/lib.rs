@@ -4,18 +4,17 @@
 //! function that reads top to bottom. `ARCHITECTURE.md` follows a frame through the files.
 
 mod blue_noise;
-pub mod cache;
 pub mod camera;
 mod clipmap;
 pub mod color;
-mod constants;
+mod directions;
 pub mod error;
 pub mod files;
 pub mod frame;
 pub mod generate;
 pub mod gpu;
+mod grid;
 mod history;
-mod kernel;
 mod lights;
 mod luts;
 mod mie;
@@ -24,11 +23,11 @@ pub mod params;
 mod passes;
 mod plan;
 mod query;
-mod recorder;
 pub mod renderer;
 pub mod scene_depth;
 pub mod schema;
 pub mod shader;
+mod shared;
 pub mod shot;
 mod specialization;
 mod targets;

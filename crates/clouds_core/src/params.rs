@@ -6,10 +6,9 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use crate::constants::constants;
 use crate::error::{Error, Result};
 use crate::schema::{self, Block, Map, Table, Typed as _};
-use crate::uniforms;
+use crate::shared::constants;
 use crate::volume::DensityGrid;
 use crate::{choice, params};
 
@@ -952,5 +951,5 @@ pub fn uniform(params: &Params, quality: &Quality) -> Vec<u32> {
         params.to_mut().high_clouds.coverage = 0.0;
     }
     let blocks = params.blocks().into_iter().map(|(_, block)| block);
-    uniforms::words(&blocks.chain([quality as &dyn Block]).collect::<Vec<_>>())
+    schema::words(&blocks.chain([quality as &dyn Block]).collect::<Vec<_>>())
 }

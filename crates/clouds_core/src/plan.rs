@@ -4,10 +4,12 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use crate::frame::Frame;
-use crate::kernel::Specialization;
+use crate::gpu::Specialization;
+use crate::grid::TILE;
+use crate::luts::Inputs;
 use crate::params::{Model, Params, Quality};
-use crate::passes::refine::TILE;
 use crate::passes::{composite, refine};
+use crate::shot::Shot;
 use crate::specialization;
 
 /// How the clouds of a picture are computed.
@@ -72,6 +74,18 @@ impl Plan {
             strips: strips.collect(),
             specialization: specialization::of_picture(params, quality, frame, layers),
         }
+    }
+
+    /// What its LUTs are made from, of a shot whose sky has its values at that time.
+    pub fn inputs<'a>(
+        &self,
+        shot: &Shot<'_>,
+        params: &'a Params,
+        quality: &'a Quality,
+        frame: &'a Frame,
+    ) -> Inputs<'a> {
+        let specialization = self.specialization.clone();
+        Inputs { params, quality, frame, eye: shot.camera.eye, time: shot.time, specialization }
     }
 
     /// Sets the rows of a strip. Lattices of rays meet in the first row of the next one.

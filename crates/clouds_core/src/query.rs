@@ -7,14 +7,14 @@ use glam::DVec3;
 use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
+use crate::gpu::Linked;
 use crate::gpu::{Interrupt, Timings, check_fork};
-use crate::kernel::{Program, Specialization};
+use crate::gpu::{Program, Specialization};
+use crate::gpu::{Recorder, Which};
 use crate::luts::{Inputs, shadow};
 use crate::params::Params;
 use crate::passes::points;
-use crate::recorder::{Recorder, Which};
 use crate::renderer::{Renderer, held};
-use crate::shader::Linked;
 use crate::shot::Shot;
 use crate::specialization;
 
@@ -160,8 +160,8 @@ impl Renderer {
              if id.x >= arrayLength(&points) {{ return; }}\nlet x = points[id.x];\n\
              results[id.x] = vec4f({expression});\n}}\n"
         );
-        let linked =
-            Linked::from_source(&source).map_err(|error| Error::parameter("imports", error, "shader names"))?;
+        let linked = Linked::from_source(&source, self.gpu.generated)
+            .map_err(|error| Error::parameter("imports", error, "shader names"))?;
         let kernel = Program::from_linked(&self.gpu, &linked)?.compile(&self.gpu, "probe", &self.of_points(params))?;
         let camera = Camera::equirect(eye)?;
         // At once, so that what is timed fills the device.

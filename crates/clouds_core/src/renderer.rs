@@ -7,23 +7,23 @@ use std::thread;
 use crate::blue_noise;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
+use crate::gpu::Recorder;
 use crate::gpu::{Download, Gpu, Interrupt, Timings, check_fork};
+use crate::grid::{self, TILE};
 use crate::history::{Accumulator, Past};
-use crate::luts::{Inputs, Luts};
+use crate::luts::Luts;
 use crate::params::{Model, Params, Quality};
 use crate::passes::composite::Parts;
 use crate::passes::display::{self, Screen};
-use crate::passes::refine::TILE;
-use crate::passes::{composite, march, path, reference, refine, reproject};
+use crate::passes::{composite, march, path, reference, reproject};
 use crate::plan::{Integrator, Plan};
-use crate::recorder::Recorder;
 use crate::scene_depth::{SceneDepth, SceneTextures};
 use crate::shot::{Shot, check_size};
 use crate::targets::{StillTargets, TemporalTargets, count};
 use crate::wind::{Carried, Going};
 
 /// What [`Renderer::history_length`] says of a pixel that has had a ray of its own: frames in which every pixel is marched once.
-pub const ROUND: u32 = reproject::round(false);
+pub const ROUND: u32 = grid::round(false);
 
 /// Makes pictures of one size with one numerical method on one device.
 pub struct Renderer {
@@ -145,7 +145,7 @@ impl Renderer {
         let plan = Plan::new(&mut frame, &params, &self.quality, false, layers);
         self.timings = Timings::default();
         let mut rec = Recorder::new(&self.gpu, &mut self.timings, interrupt);
-        let inputs = Inputs::new(shot, &params, &self.quality, &frame, &plan);
+        let inputs = plan.inputs(shot, &params, &self.quality, &frame);
         self.luts.update(&mut rec, &inputs)?;
         let scene = fit_scene(&mut self.scene_depth, &self.gpu, shot.scene, frame.view.width * plan.most_rows());
         rec.bind(scene.map_or(Vec::new(), SceneTextures::bindings));
@@ -214,7 +214,7 @@ impl Renderer {
 
         self.timings = Timings::default();
         let mut rec = Recorder::new(&self.gpu, &mut self.timings, interrupt);
-        let inputs = Inputs::new(shot, &params, &self.quality, &frame, &plan);
+        let inputs = plan.inputs(shot, &params, &self.quality, &frame);
         self.luts.update(&mut rec, &inputs)?;
         rec.bind(self.scene_depth.as_ref().map_or(Vec::new(), SceneTextures::bindings));
         self.lut_memory = held(&rec);
@@ -286,14 +286,14 @@ impl Renderer {
             return Ok(Vec::new());
         };
         let [width, height] = targets.size;
-        let [columns, rows] = refine::known(targets.size, targets.sparse);
+        let [columns, rows] = grid::known(targets.size, targets.sparse);
         let mut timings = Timings::default();
         let mut rec = Recorder::new(&self.gpu, &mut timings, &|| Ok(()));
         rec.download(&targets.before.length, 0, 4 * count([columns, rows]));
         let lengths = rec.submit()?;
         let lengths: &[u32] = lengths[0].numbers();
-        let spacing = refine::spacing(targets.sparse);
-        let unit = ROUND / reproject::round(targets.sparse);
+        let spacing = grid::spacing(targets.sparse);
+        let unit = ROUND / grid::round(targets.sparse);
         let at = |x: u32, y: u32| unit * lengths[(y / spacing * columns + x / spacing) as usize];
         Ok((0..height).flat_map(|y| (0..width).map(move |x| at(x, y))).collect())
     }
@@ -376,7 +376,7 @@ fn download(rec: &mut Recorder<'_>, frame: &Frame, targets: &StillTargets, layer
     if layers {
         rec.download(&composed.sky, 0, 16 * pixels);
         rec.download(&composed.depth, 0, 4 * pixels);
-        let known = refine::known([frame.view.width, frame.dispatch.rows], frame.sparse);
+        let known = grid::known([frame.view.width, frame.dispatch.rows], frame.sparse);
         rec.download(&marched.samples, 0, 4 * count(known));
         if let Some(rays) = rays {
             rec.download(&rays.uncertainty, 0, 16 * pixels);
@@ -395,7 +395,7 @@ impl Picture {
         self.depth.extend_from_slice(downloads[2].numbers());
         let samples: &[u32] = downloads[3].numbers();
         if frame.sparse {
-            let [columns, _] = refine::known([frame.view.width, frame.dispatch.rows], true);
+            let [columns, _] = grid::known([frame.view.width, frame.dispatch.rows], true);
             self.samples.extend(at_known(samples, columns, [frame.view.width, frame.dispatch.rows]));
         } else {
             self.samples.extend_from_slice(samples);
@@ -425,8 +425,8 @@ impl Frame {
         self.view.moving = u32::from(!still);
         if let Some(old) = resized {
             [self.view.previous_width, self.view.previous_height] = old.size;
-            self.view.previous_spacing = refine::spacing(old.sparse);
-            self.view.previous_round = reproject::round(old.sparse);
+            self.view.previous_spacing = grid::spacing(old.sparse);
+            self.view.previous_round = grid::round(old.sparse);
         }
     }
 }

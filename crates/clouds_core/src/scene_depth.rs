@@ -2,10 +2,10 @@
 
 use std::ops::Range;
 
-use crate::constants::constants;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
-use crate::kernel::{Binding, Bindings};
+use crate::gpu::{Binding, Bindings};
+use crate::shared::constants;
 
 /// Farthest distance of a scene, m: what is beyond it counts as sky, as infinity does. Five times the diameter of the
 /// largest planet. Rasterizers call the sky 1e10 and more, or the largest f32.

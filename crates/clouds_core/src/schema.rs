@@ -463,6 +463,17 @@ macro_rules! params {
     )* };
 }
 
+/// The words of a uniform block of several parts.
+pub(crate) fn words(parts: &[&dyn Block]) -> Vec<u32> {
+    let mut words = Vec::new();
+    for part in parts {
+        let start = words.len();
+        words.resize(start + size(part.fields()) / 4, 0);
+        part.write(&mut words[start..]);
+    }
+    words
+}
+
 /// Declares a parameter type that is one of a few words.
 #[macro_export]
 macro_rules! choice {

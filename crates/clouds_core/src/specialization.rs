@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use crate::frame::Frame;
-use crate::kernel::Specialization;
+use crate::gpu::Specialization;
+use crate::grid;
 use crate::params::{Params, Quality, WeatherNoise};
-use crate::passes::reproject;
 
 /// The table of a picture. `layers`: the sky and the depth are asked for too.
 pub(crate) fn of_picture(params: &Params, quality: &Quality, frame: &Frame, layers: bool) -> Arc<Specialization> {
@@ -18,7 +18,7 @@ pub(crate) fn of_picture(params: &Params, quality: &Quality, frame: &Frame, laye
         ("SCENE", on(frame.scene)),
         ("SUBRAYS", on(params.volume.is_none() && frame.has_subrays())),
         ("SPARSE", on(frame.sparse)),
-        ("STRIDE", f64::from(reproject::stride(frame.sparse))),
+        ("STRIDE", f64::from(grid::stride(frame.sparse))),
         ("WIDE_PHASE", on(frame.view.phase_samples > 1)),
         ("HIGH", on(high)),
         ("HIGH_EMBOSS", on(high && frame.high_emboss)),
@@ -70,7 +70,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     use super::*;
-    use crate::shader::{self, Linked};
+    use crate::shader;
 
     /// A name that stands in one of them only is a switch that does nothing, or one that nobody sets.
     #[test]
@@ -80,7 +80,7 @@ mod tests {
         let ours: BTreeSet<_> = table.names().map(str::to_owned).collect();
         let mut theirs = BTreeSet::new();
         for name in shader::names() {
-            let (module, _) = Linked::new(name).expect("links").parse().expect("is valid");
+            let (module, _) = shader::link(name).expect("links").parse().expect("is valid");
             // Those that are worked out from others are nobody's to set.
             let free = |constant: &wgpu::naga::Override| {
                 constant

@@ -1,13 +1,14 @@
 //! What a picture is made in: buffers kept from one to the next.
 
 use crate::frame::Frame;
+use crate::gpu::Bindings;
 use crate::gpu::Gpu;
-use crate::kernel::Bindings;
+use crate::grid;
+use crate::passes::clouds::Marched;
 use crate::passes::composite::{Backdrop, Composed};
-use crate::passes::march::Marched;
 use crate::passes::rays::Rays;
-use crate::passes::refine::{self, Refined};
-use crate::passes::reproject::{self, Current, Followed};
+use crate::passes::refine::Refined;
+use crate::passes::reproject::{Current, Followed};
 use crate::passes::{path, reference};
 use crate::plan::Integrator;
 use crate::scene_depth::SceneTextures;
@@ -26,7 +27,7 @@ pub(crate) struct StillTargets {
 
 impl StillTargets {
     fn new(gpu: &Gpu, size: [u32; 2], integrator: Integrator, sparse: bool) -> Self {
-        let [pixels, known] = [size, refine::known(size, sparse)].map(count);
+        let [pixels, known] = [size, grid::known(size, sparse)].map(count);
         let ray_bytes = match integrator {
             Integrator::March => None,
             Integrator::Reference => Some(reference::RAY_BYTES),
@@ -80,8 +81,8 @@ pub(crate) struct TemporalTargets {
 
 impl TemporalTargets {
     pub fn new(gpu: &Gpu, size: [u32; 2], sparse: bool) -> Self {
-        let known = refine::known(size, sparse);
-        let cells = reproject::cells(known, sparse);
+        let known = grid::known(size, sparse);
+        let cells = grid::cells(known, sparse);
         let [known, cells] = [known, cells].map(count);
         Self {
             size,

@@ -1,12 +1,11 @@
 //! The uniform blocks that follow from a picture, by how long they hold: `frame` with its parts `view` and `sky`, and `dispatch`.
 //! The third, `params`, is what the user sets.
 
+use crate::gpu::Binding;
 use crate::gpu::Gpu;
-use crate::kernel::Binding;
-use crate::params;
 use crate::schema::{self, Block};
 
-params! {
+crate::params! {
     /// Eye, camera and planet, and where they were in the frame before. Worked out in f64 (frame.rs).
     View {
         /// Width of the picture in pixels.
@@ -98,7 +97,7 @@ params! {
     }
 }
 
-params! {
+crate::params! {
     /// Sun, moon, clouds and winds as the eye finds them at the time of the frame. Worked out in f64 (frame.rs).
     Sky {
         /// Lowest altitude of procedural clouds and rain, m.
@@ -205,7 +204,7 @@ params! {
     }
 }
 
-params! {
+crate::params! {
     /// Which pixels or rays a dispatch is for.
     Dispatch {
         /// First row of this band of the picture (of the marched rows, in `march`).
@@ -243,20 +242,9 @@ params! {
     }
 }
 
-/// The words of a uniform block of several parts.
-pub(crate) fn words(parts: &[&dyn Block]) -> Vec<u32> {
-    let mut words = Vec::new();
-    for part in parts {
-        let start = words.len();
-        words.resize(start + schema::size(part.fields()) / 4, 0);
-        part.write(&mut words[start..]);
-    }
-    words
-}
-
-/// That uniform block.
+/// A uniform block of several parts.
 pub(crate) fn uniform(parts: &[&dyn Block]) -> Binding {
-    Binding::block(&words(parts))
+    Binding::block(&schema::words(parts))
 }
 
 impl Dispatch {

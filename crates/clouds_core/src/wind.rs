@@ -6,8 +6,8 @@ use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3};
 
+use crate::directions::compass;
 use crate::error::{Error, Result};
-use crate::frame::compass;
 use crate::params::{Drift, HighClouds, Params, UpperClouds, Wander, Wind};
 use crate::schema::Block as _;
 

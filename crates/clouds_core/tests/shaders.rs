@@ -9,7 +9,7 @@ use clouds_core::uniforms::{Dispatch, Sky, View};
 use wgpu::naga::{self, TypeInner};
 
 fn linked(name: &str) -> (Linked, naga::Module) {
-    let linked = Linked::new(name).expect("links");
+    let linked = shader::link(name).expect("links");
     let (module, _) = linked.parse().unwrap_or_else(|error| panic!("{error}"));
     (linked, module)
 }

@@ -107,7 +107,9 @@ fn what_is_interrupted_leaves_nothing_behind() {
             let image = renderer.animate(&shot, &|| Ok(())).expect("is made");
             let expected = other.animate(&shot, &|| Ok(())).expect("is made");
             assert!(image == expected, "{quality}: interrupted after {patience} questions");
-            [&mut renderer, &mut other].map(Renderer::cut);
+            for animated in [&mut renderer, &mut other] {
+                animated.cut();
+            }
             if !interrupted {
                 assert!(patience >= questions, "{quality}: {patience}");
                 break;

@@ -2,12 +2,13 @@
 
 use glam::DVec2;
 
+use super::lut::{Inputs, Lut, view};
+use super::shadow;
 use super::sky::near;
-use super::{Inputs, Lut, shadow, view};
 use crate::error::Result;
 use crate::frame::Frame;
+use crate::gpu::Recorder;
 use crate::params;
-use crate::recorder::Recorder;
 
 /// Angle between rays in the middle of the picture, radians, most of them along a side (393 go around a panorama), and slices
 /// of their distance.

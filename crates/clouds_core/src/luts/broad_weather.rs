@@ -1,22 +1,16 @@
 //! The larger weather map, which shifts and bends the smaller one: baked from noise, the user's own, or a mixture.
 
+use super::lut::{Inputs, Lut, bake_map, load_or_bake, view};
 use super::weather::mix;
-use super::{Inputs, Lut, bake_map, load_or_bake, view};
-use crate::constants::constants;
 use crate::error::Result;
+use crate::gpu::Recorder;
 use crate::params::{BroadShares, BroadSource, Edge, Params, Weather};
-use crate::recorder::Recorder;
+use crate::shared::constants;
 
 constants! {
     /// Texels of the side of a baked larger map: it holds nothing smaller than a twelfth of itself.
     const BROAD_SIZE: u32 = 128;
 }
-/// By how many tiles of the smaller map a value of 1 bends it. Measured on the default sky, whose clouds stand 5 km apart: the
-/// tiles next to each other are bent apart by more than that nearly everywhere.
-pub(crate) const BEND: f32 = 0.8;
-/// The steepest that a baked value changes, for each width of the map.
-pub(crate) const STEEPEST: f64 = 40.0;
-
 /// The larger map on the GPU.
 #[derive(Default)]
 pub(crate) struct BroadWeather {

@@ -1,22 +1,10 @@
 //! The texture of the high clouds, made again when its shapes have evolved.
 
-use super::{Inputs, Lut, view};
-use crate::constants::constants;
+use super::lut::{Inputs, Lut, view};
 use crate::error::Result;
 use crate::gpu::COPIED;
+use crate::gpu::Recorder;
 use crate::params;
-use crate::recorder::Recorder;
-
-constants! {
-    /// How many times larger the second read of the high clouds is than the first: no small ratio, so that they do not
-    /// repeat together.
-    pub(crate) const BROAD: f32 = 3.2;
-    /// Updates of an octave of the high clouds after which their numbers come round: all are exact in f32.
-    pub(crate) const UPDATES: u32 = 65_536;
-    /// Sines of the sun's height, 12 and 20 degrees, between which its light goes over from another on each of the high
-    /// clouds in sight to the same on all.
-    pub(crate) const LOW_SUN: [f64; 2] = [0.208, 0.342];
-}
 
 /// What the texture is made from: seed, octaves, stretch, type, size, and the ages and numbers of its updates.
 type Key = (u32, u32, f32, f32, u32, [[f32; 4]; 4]);

@@ -1,11 +1,12 @@
 //! What the density nearby never exceeds, for delta tracking: baked when paths are traced.
 
+use super::lut::{Inputs, Lut, view};
 use super::volume::Grid;
-use super::{Inputs, Lut, view, weather};
-use crate::constants::constants;
+use super::weather;
 use crate::error::Result;
+use crate::gpu::Recorder;
 use crate::params::{self, BroadShares, Edge, Model};
-use crate::recorder::Recorder;
+use crate::shared::constants;
 
 constants! {
     /// Voxels of the user's grid along the side of a cell.

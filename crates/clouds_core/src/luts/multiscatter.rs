@@ -1,11 +1,12 @@
 //! The light that air and ground have scattered, by altitude and the height of the sun.
 
-use super::{Inputs, Lut, MIXED, load_or_bake, transmittance, view};
-use crate::constants::constants;
+use super::lut::{Inputs, Lut, MIXED, load_or_bake, view};
+use super::transmittance;
 use crate::error::Result;
-use crate::kernel::Bindings;
+use crate::gpu::Bindings;
+use crate::gpu::Recorder;
 use crate::params;
-use crate::recorder::Recorder;
+use crate::shared::constants;
 
 constants! {
     /// Tables of the light that has been scattered, one below the other (`SCATTERED` to `FLUX_SUNWARD`).

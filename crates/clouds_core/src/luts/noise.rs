@@ -2,13 +2,13 @@
 
 use std::sync::{Arc, Mutex};
 
-use super::{Inputs, load_or_bake, view};
-use crate::constants::constants;
+use super::lut::{Inputs, load_or_bake, view};
 use crate::error::Result;
+use crate::gpu::Bindings;
 use crate::gpu::{COPIED, Gpu, lock};
-use crate::kernel::Bindings;
+use crate::gpu::{Recorder, Token};
 use crate::params;
-use crate::recorder::{Recorder, Token};
+use crate::shared::constants;
 
 constants! {
     /// Texels of the base shape's side (nubis2015).

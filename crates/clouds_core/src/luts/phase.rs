@@ -2,12 +2,12 @@
 
 use std::f64::consts::PI;
 
-use super::{Inputs, Lut, view};
-use crate::cache;
+use super::lut::{Inputs, Lut, view};
 use crate::error::Result;
+use crate::gpu::Recorder;
+use crate::gpu::disk_cache as cache;
 use crate::mie;
 use crate::params::Phase;
-use crate::recorder::Recorder;
 
 /// Angles of the table: pi sin^2 of equal steps, dense where peak and glory are. 0.14 degrees apart in the middle.
 const ENTRIES: usize = 2048;

@@ -1,8 +1,8 @@
 //! The user's density by height and type, as a texture.
 
-use super::{Inputs, Lut, view};
+use super::lut::{Inputs, Lut, view};
 use crate::error::Result;
-use crate::recorder::Recorder;
+use crate::gpu::Recorder;
 use crate::schema::Table;
 
 /// The table on the GPU.

@@ -1,19 +1,15 @@
 //! Sunlight through the clouds to the ground: a map for the user, and levels around the eye for pictures of the ground and of
 //! shaded air, baked when sun or clouds have changed, or when wind or eye have gone far.
 
-use glam::{DVec2, DVec3};
-
+use super::lut::{Inputs, Lut, view};
 use super::volume::Grid;
-use super::{Inputs, Lut, view};
 use crate::camera::Camera;
-use crate::clipmap::{Casters, Origin, casters};
-use crate::constants::constants;
+use crate::clipmap::{Casters, casters, origin};
 use crate::error::Result;
 use crate::frame::Frame;
-use crate::params::Params;
-use crate::recorder::Recorder;
+use crate::gpu::Recorder;
+use crate::shared::constants;
 use crate::uniforms::Dispatch;
-use crate::wind::Carried;
 
 constants! {
     /// Texels across a level of the shadows on the ground.
@@ -21,15 +17,6 @@ constants! {
     /// Levels of them, each twice as wide and coarse as the one before.
     const SHADOW_LEVELS: u32 = 5;
 }
-/// The side of a texel of the finest level, m, for eyes up to so high; twice as long for each doubling of the altitude, as
-/// pixels are. The sun's half degree blurs shadows of clouds 3 km up by 28 m.
-const TEXEL: f32 = 64.0;
-const TEXEL_ALTITUDE: f32 = 12_000.0;
-
-/// The clouds may move so far while the shadows stay, m: half a texel, and a power of two, so that where winds have come
-/// round after times that are powers of two, shadows have too.
-const CLOUD_STEP: f64 = 32.0;
-
 /// What the shadows are made from: sun, clouds, weather, wind, planet and grid, and for where, how fine and when.
 pub(crate) type Key = (Casters, (f32, Grid), [i64; 3], f32);
 
@@ -44,26 +31,6 @@ pub(crate) fn key(inputs: &Inputs<'_>) -> Key {
 #[derive(Default)]
 pub(crate) struct GroundShadow {
     lut: Lut<Key>,
-}
-
-/// From where and when a picture's shadows are baked: the user's grid stays where it is.
-fn origin(eye: DVec3, params: &Params, time: f64) -> Origin {
-    Origin::new(eye, params, if params.volume.is_some() { 0.0 } else { time }, CLOUD_STEP)
-}
-
-/// Where the eye is in the levels of its picture.
-pub(crate) fn eye_in(eye: DVec3, params: &Params, time: f64) -> [f32; 2] {
-    let origin = origin(eye, params, time);
-    let drift = match params.volume {
-        Some(_) => DVec2::ZERO,
-        None => Carried::new(params, origin.time, time).drift().truncate(),
-    };
-    (eye.truncate() - origin.place - drift).as_vec2().to_array()
-}
-
-/// The side of a texel of the finest level for an eye at an altitude, m.
-pub(crate) fn texel(altitude: f32) -> f32 {
-    TEXEL * (altitude / TEXEL_ALTITUDE).max(1.0).log2().floor().exp2()
 }
 
 /// Whether a picture reads them.

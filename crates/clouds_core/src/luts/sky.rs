@@ -2,13 +2,14 @@
 
 use glam::DVec3;
 
-use super::{Inputs, Lut, transmittance, view};
+use super::lut::{Inputs, Lut, view};
+use super::transmittance;
 use crate::camera::Camera;
-use crate::constants::constants;
 use crate::error::Result;
 use crate::frame::Frame;
+use crate::gpu::Recorder;
 use crate::params::{self, Params};
-use crate::recorder::Recorder;
+use crate::shared::constants;
 
 /// Texels of the sky map: azimuth from the sun, angle from the horizon.
 const SIZE: [u32; 3] = [128, 160, 1];

@@ -1,9 +1,9 @@
 //! The optical depth of the air to space, by altitude and direction.
 
-use super::{Inputs, Lut, bake_map, load_or_bake, view};
+use super::lut::{Inputs, Lut, bake_map, load_or_bake, view};
 use crate::error::Result;
+use crate::gpu::Recorder;
 use crate::params::{self, Params};
-use crate::recorder::Recorder;
 
 /// Texels: distance to the top of the air, altitude (Hillaire 2020).
 const SIZE: [u32; 3] = [256, 64, 1];

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use super::{Inputs, Lut, view};
+use super::lut::{Inputs, Lut, view};
 use crate::error::Result;
-use crate::recorder::Recorder;
+use crate::gpu::Recorder;
 use crate::volume::DensityGrid;
 
 /// The grid as a texture, 1 at its largest extinction, which half floats could not hold.

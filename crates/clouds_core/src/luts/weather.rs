@@ -1,13 +1,13 @@
 //! The weather map: baked from noise, the user's own, or a mixture of such maps.
 
-use super::{Inputs, Lut, MIXED, bake_map, load_or_bake, view};
-use crate::constants::constants;
+use super::lut::{Inputs, Lut, MIXED, bake_map, load_or_bake, view};
 use crate::error::Result;
 use crate::gpu::Gpu;
-use crate::kernel::{Binding, Bindings};
+use crate::gpu::{Binding, Bindings};
+use crate::gpu::{Recorder, Token};
 use crate::params::{self, Edge, Params};
-use crate::recorder::{Recorder, Token};
 use crate::schema::Map;
+use crate::shared::constants;
 use crate::specialization;
 
 constants! {

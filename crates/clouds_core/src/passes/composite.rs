@@ -1,12 +1,13 @@
 //! The clouds before the sky: what the caller gets.
 
-use super::march::Marched;
-use super::refine::{Refined, TILE, WIDEST};
+use super::clouds::Marched;
+use super::refine::Refined;
 use crate::frame::Frame;
+use crate::gpu::Bindings;
 use crate::gpu::Gpu;
-use crate::kernel::Bindings;
+use crate::gpu::Recorder;
+use crate::grid::{TILE, WIDEST};
 use crate::params::{Params, Quality};
-use crate::recorder::Recorder;
 use crate::uniforms::Dispatch;
 
 /// Share of the cells that are not smooth as a rule.

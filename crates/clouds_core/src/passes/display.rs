@@ -4,9 +4,9 @@ use super::composite::Composed;
 use crate::color::{TONE_MAPS, to_srgb8, tone_map_index};
 use crate::error::{Error, Result};
 use crate::frame::Frame;
+use crate::gpu::Bindings;
 use crate::gpu::Gpu;
-use crate::kernel::Bindings;
-use crate::recorder::Recorder;
+use crate::gpu::Recorder;
 use crate::uniforms::Dispatch;
 
 /// A texture of the device that a window shows: 8-bit pixels, encoded for a display.

@@ -1,40 +1,11 @@
 //! The march through the clouds, of every pixel or of a subset.
 
+use super::clouds::Marched;
 use super::refine::{self, Refined};
 use crate::frame::Frame;
-use crate::gpu::Gpu;
-use crate::kernel::Bindings;
+use crate::gpu::Recorder;
 use crate::params::Quality;
-use crate::recorder::Recorder;
 use crate::uniforms::Dispatch;
-
-/// What the march makes of each pixel of a sheet or of a picture.
-pub(crate) struct Marched {
-    /// Premultiplied radiance and transmittance.
-    pub clouds: wgpu::Buffer,
-    /// Metres to the mean scattering point, -1 where there is none.
-    pub depth: wgpu::Buffer,
-    /// Density evaluations.
-    pub samples: wgpu::Buffer,
-}
-
-impl Marched {
-    pub fn new(gpu: &Gpu, pixels: u64) -> Self {
-        Self {
-            clouds: gpu.buffer("clouds", 16 * pixels),
-            depth: gpu.buffer("cloud_depth", 4 * pixels),
-            samples: gpu.picture_buffer("samples", 4 * pixels),
-        }
-    }
-
-    pub fn bindings(&self) -> Bindings {
-        vec![
-            ("clouds", (&self.clouds).into()),
-            ("cloud_depth", (&self.depth).into()),
-            ("samples", (&self.samples).into()),
-        ]
-    }
-}
 
 /// Marches a sheet: the pixels of a lattice, then those between rays that do not look alike, or all of them.
 pub(crate) fn record(rec: &mut Recorder<'_>, frame: &Frame, quality: &Quality, refined: &Refined, out: &Marched) {

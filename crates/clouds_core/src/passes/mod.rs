@@ -1,5 +1,6 @@
 //! What makes a picture, one module for each pass with the WGSL file of the same name. Each records itself.
 
+pub mod clouds;
 pub mod composite;
 pub mod display;
 pub mod march;

@@ -1,10 +1,10 @@
 //! Paths of light through every order of scattering.
 
-use super::march::Marched;
+use super::clouds::Marched;
 use super::rays::Rays;
 use crate::error::Result;
 use crate::frame::Frame;
-use crate::recorder::Recorder;
+use crate::gpu::Recorder;
 
 /// Bytes of a `PathRay` of bindings.wgsl.
 pub const RAY_BYTES: u64 = 176;

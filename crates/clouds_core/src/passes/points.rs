@@ -2,7 +2,7 @@
 
 use crate::error::Result;
 use crate::frame::Frame;
-use crate::recorder::{Recorder, Which};
+use crate::gpu::{Recorder, Which};
 use crate::uniforms::Dispatch;
 
 /// Points in one dispatch: few enough that a march of each toward the sun stays far under a watchdog's second.

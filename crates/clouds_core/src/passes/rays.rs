@@ -5,8 +5,8 @@ use std::time::Instant;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::gpu::Gpu;
-use crate::kernel::{Bindings, Name};
-use crate::recorder::Recorder;
+use crate::gpu::Recorder;
+use crate::gpu::{Bindings, Name};
 use crate::uniforms::Dispatch;
 
 /// Most turns of a dispatch: with the loops inside one, lavapipe's limit of 65,535 over a shader is far (hazard 21).

@@ -1,23 +1,13 @@
 //! Which pixels are marched: a coarse lattice, then those between rays that do not look alike.
 
-use std::f32::consts::PI;
-
-use super::march::Marched;
+use super::clouds::Marched;
 use crate::camera::Camera;
-use crate::constants::constants;
 use crate::frame::Frame;
+use crate::gpu::Bindings;
 use crate::gpu::Gpu;
-use crate::kernel::Bindings;
+use crate::gpu::{List, Recorder};
+use crate::grid::{TILE, WIDEST};
 use crate::params::Quality;
-use crate::recorder::{List, Recorder};
-
-constants! {
-    /// Pixels from one corner of a cell to the next: the distance of the pixels that are marched first, at most.
-    pub(crate) const TILE: u32 = 4;
-}
-/// The same distance as an angle, radians. Clouds are lost between rays farther apart: at 1.3 degrees `fair_weather`
-/// errs by 11 %, at a third of one by 3 % (contrast 0.1).
-pub(crate) const WIDEST: f32 = 0.5 * PI / 180.0;
 
 /// Whether the pixels of that lattice are all that is ever marched: where no contrast is too large to interpolate, and no scene of the
 /// user's has edges. The rest of the picture is interpolated where it is composed (composite.wgsl), cell by cell.
@@ -31,16 +21,6 @@ impl Quality {
     pub fn is_sparse(&self, camera: &Camera, size: [u32; 2]) -> bool {
         self.tolerance == 0.0 && is_sparse(&Frame::seen_by(camera, size), self)
     }
-}
-
-/// How many pixels of a picture, or of a sheet, the clouds are known at.
-pub(crate) fn known(size: [u32; 2], sparse: bool) -> [u32; 2] {
-    if sparse { size.map(|pixels| pixels.div_ceil(TILE) + 1) } else { size }
-}
-
-/// Pixels from one of those to the next.
-pub(crate) fn spacing(sparse: bool) -> u32 {
-    if sparse { TILE } else { 1 }
 }
 
 /// The pixels to be marched next.

@@ -1,58 +1,17 @@
 //! Temporal reprojection: one pixel in sixteen is marched, the others come from the frame before. Of a sparse picture, whose
 //! clouds are known at one pixel in sixteen, one in four of those is.
 
-use super::march::{self, Marched};
+use super::clouds::Marched;
+use super::march;
 use super::refine::{self, Refined};
 use crate::frame::Frame;
 use crate::gpu::Gpu;
-use crate::kernel::{Binding, Bindings};
+use crate::gpu::Recorder;
+use crate::gpu::{Binding, Bindings};
+use crate::grid;
 use crate::params::Quality;
-use crate::recorder::Recorder;
 use crate::scene_depth::SceneTextures;
 use crate::uniforms::Dispatch;
-
-/// One of this many pixels that are known is marched in a frame, in each direction.
-pub(crate) const fn stride(sparse: bool) -> u32 {
-    if sparse { 2 } else { 4 }
-}
-
-/// The order in which the sixteen pixels of a cell are marched: a Bayer matrix, so that any few of them in a row are
-/// spread over the cell.
-const ORDER: [[u32; 2]; 16] = [
-    [0, 0],
-    [2, 2],
-    [2, 0],
-    [0, 2],
-    [1, 1],
-    [3, 3],
-    [3, 1],
-    [1, 3],
-    [1, 0],
-    [3, 2],
-    [3, 0],
-    [1, 2],
-    [0, 1],
-    [2, 3],
-    [2, 1],
-    [0, 3],
-];
-
-/// Frames in which every pixel that is known is marched once.
-pub(crate) const fn round(sparse: bool) -> u32 {
-    stride(sparse) * stride(sparse)
-}
-
-/// Cells of a picture of so many known pixels.
-pub(crate) fn cells(known: [u32; 2], sparse: bool) -> [u32; 2] {
-    known.map(|pixels| pixels.div_ceil(stride(sparse)))
-}
-
-/// The pixel of a cell that a frame marches.
-pub(crate) fn subpixel(index: u32, sparse: bool) -> [u32; 2] {
-    // The first four are the corners of quarters of the cell, and sparse cells twice as wide.
-    let scale = if sparse { 2 } else { 1 };
-    ORDER[(index % round(sparse)) as usize].map(|place| scale * place)
-}
 
 /// Largest share of the pixels of a frame that are marched one by one: a still, which marches an eighth to a fifth of them, is
 /// nearer to the truth then and takes no longer.
@@ -139,11 +98,11 @@ pub(crate) fn record(rec: &mut Recorder<'_>, frame: &Frame, quality: &Quality, i
     let gpu = rec.gpu;
     let Buffers { refined, current, before, now, .. } = *buffers;
     let sparse = frame.sparse;
-    let stride = stride(sparse);
+    let stride = grid::stride(sparse);
     let mut rays = frame.clone();
-    rays.dispatch.stride = stride * refine::spacing(sparse);
-    [rays.dispatch.subpixel_x, rays.dispatch.subpixel_y] = subpixel(index, sparse);
-    [rays.dispatch.march_width, rays.dispatch.sheet_rows] = cells(frame.known(), sparse);
+    rays.dispatch.stride = stride * grid::spacing(sparse);
+    [rays.dispatch.subpixel_x, rays.dispatch.subpixel_y] = grid::subpixel(index, sparse);
+    [rays.dispatch.march_width, rays.dispatch.sheet_rows] = grid::cells(frame.known(), sparse);
     march::record(rec, &rays, quality, refined, &current.marched);
 
     // Asks the frame before for these rays, and compares.

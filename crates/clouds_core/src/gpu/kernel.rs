@@ -4,16 +4,17 @@
 use std::borrow::Cow;
 use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 use wgpu::naga::valid::ModuleInfo;
 use wgpu::naga::{
     AddressSpace, Block, Expression, Function, Handle, ImageDimension, Module, Override, Statement, TypeInner,
 };
 
+use super::adapter::lock;
+use super::device::Gpu;
+use super::link::Linked;
 use crate::error::{Error, Result};
-use crate::gpu::Gpu;
-use crate::shader::Linked;
 
 /// A pass, and an entry point of it.
 pub(crate) type Name = (&'static str, &'static str);
@@ -136,7 +137,7 @@ pub(crate) type Key = (String, String, Vec<Option<u64>>);
 impl Program {
     /// Links and validates a pass.
     pub fn new(gpu: &Gpu, pass: &str) -> Result<Self> {
-        let linked = Linked::new(&format!("passes/{pass}")).map_err(Error::Device)?;
+        let linked = Linked::new(&format!("passes/{pass}"), gpu.generated).map_err(Error::Device)?;
         Self::from_linked(gpu, &linked)
     }
 
@@ -331,5 +332,89 @@ impl Kernel {
         let descriptor =
             wgpu::BindGroupDescriptor { label: Some(&self.label), layout: &self.layout, entries: &entries };
         Ok(gpu.device.create_bind_group(&descriptor))
+    }
+}
+
+/// A kernel that is there, or is being compiled by whoever holds the lock.
+type Slot = Arc<Mutex<Option<Arc<Kernel>>>>;
+
+/// Kernels, each with the number of its last use.
+#[derive(Default)]
+struct Kept {
+    slots: HashMap<Key, (Slot, u64)>,
+    uses: u64,
+}
+
+/// Programs by name, and kernels, of a device.
+#[derive(Default)]
+struct Kernels {
+    programs: Mutex<HashMap<&'static str, Arc<Program>>>,
+    kept: Mutex<Kept>,
+}
+
+/// Most kernels that are kept: on lavapipe one takes 2 to 3 MB, and a picture has ten to thirty.
+const MOST_KERNELS: usize = 48;
+
+impl Kept {
+    /// Forgets those whose last use is longest ago, where there are too many.
+    fn forget(&mut self) {
+        while self.slots.len() > MOST_KERNELS {
+            let Some(oldest) = self.slots.iter().min_by_key(|(_, (_, last_use))| *last_use) else { return };
+            let key = oldest.0.clone();
+            self.slots.remove(&key);
+        }
+    }
+}
+
+impl Gpu {
+    /// A pass, linked and validated on first use.
+    fn program(&self, pass: &'static str) -> Result<Arc<Program>> {
+        let kernels = self.common::<Kernels>();
+        let known = lock(&kernels.programs).get(pass).cloned();
+        if let Some(program) = known {
+            return Ok(program);
+        }
+        let program = Arc::new(Program::new(self, pass)?);
+        Ok(lock(&kernels.programs).entry(pass).or_insert(program).clone())
+    }
+
+    fn slot(&self, name: Name, specialization: &Specialization) -> Result<(Arc<Program>, Slot)> {
+        let program = self.program(name.0)?;
+        let key = program.key(name, specialization)?;
+        let common = self.common::<Kernels>();
+        let mut kernels = lock(&common.kept);
+        let use_number = kernels.uses;
+        kernels.uses += 1;
+        let (slot, last_use) = kernels.slots.entry(key).or_default();
+        *last_use = use_number;
+        let slot = slot.clone();
+        kernels.forget();
+        Ok((program, slot))
+    }
+
+    /// A kernel, compiled on first use.
+    pub(crate) fn kernel(&self, name: Name, specialization: &Specialization) -> Result<Arc<Kernel>> {
+        let (program, slot) = self.slot(name, specialization)?;
+        let mut slot = lock(&slot);
+        if let Some(kernel) = &*slot {
+            return Ok(kernel.clone());
+        }
+        let kernel = Arc::new(program.compile(self, name.1, specialization)?);
+        *slot = Some(kernel.clone());
+        Ok(kernel)
+    }
+
+    /// Whether a kernel is there already.
+    pub(crate) fn is_compiled(&self, name: Name, specialization: &Specialization) -> Result<bool> {
+        let (_, slot) = self.slot(name, specialization)?;
+        // One that is being compiled is locked.
+        Ok(slot.try_lock().is_ok_and(|slot| slot.is_some()))
+    }
+
+    /// Forgets what has been compiled, so that the shaders are read anew.
+    pub(crate) fn forget_kernels(&self) {
+        let kernels = self.common::<Kernels>();
+        lock(&kernels.programs).clear();
+        lock(&kernels.kept).slots.clear();
     }
 }

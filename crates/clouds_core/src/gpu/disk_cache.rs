@@ -10,8 +10,8 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::SystemTime;
 
+use super::adapter::{AdapterInfo, lock};
 use crate::error::{Error, Result};
-use crate::gpu::{AdapterInfo, lock};
 
 /// How every file begins: whose it is. One that begins otherwise is not read.
 const MAGIC: &str = concat!("nubis ", env!("CARGO_PKG_VERSION"), ", format 1\n");

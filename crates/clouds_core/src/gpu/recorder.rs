@@ -14,10 +14,11 @@ use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::Instant;
 
-use crate::constants::constants;
+use super::adapter::lock;
+use super::device::{COPIED, Download, Gpu, Interrupt, Timings, mips, texture_bytes};
+use super::kernel::{Binding, Bindings, Kernel, Name, Resources, Specialization};
 use crate::error::Result;
-use crate::gpu::{COPIED, Download, Gpu, Interrupt, Timings, lock, mips, texture_bytes};
-use crate::kernel::{Binding, Bindings, Kernel, Name, Resources, Specialization};
+use crate::shared::constants;
 
 /// Longest that one submission usually keeps the device busy, s, and that one dispatch does whose list is as long as it can be: a
 /// fourth of the two seconds after which Windows resets a device. After Ctrl-C two of them go on.
@@ -564,4 +565,39 @@ impl Extent {
 
 fn encoder(gpu: &Gpu) -> wgpu::CommandEncoder {
     gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("recording") })
+}
+
+/// Seconds that an invocation is thought to take before any has been timed, on a processor and on a GPU: ten times as long as one
+/// of a march in `draft`, as long as one in `high`.
+const FIRST_GUESS: [f64; 2] = [3e-5, 1e-7];
+/// Invocations up to which a dispatch says nothing of how long one takes: launching it takes longer.
+const TOO_FEW: f64 = 1024.0;
+
+/// Seconds that an invocation takes, by kernel.
+#[derive(Default)]
+struct Costs(Mutex<HashMap<String, f64>>);
+
+impl Gpu {
+    /// Seconds that an invocation of a kernel takes.
+    fn seconds_each(&self, kernel: &str) -> f64 {
+        let [processor, other] = FIRST_GUESS;
+        let guess = if self.info.kind == "cpu" { processor } else { other };
+        lock(&self.common::<Costs>().0).get(kernel).copied().unwrap_or(guess)
+    }
+
+    /// How many invocations of a kernel take so many seconds, at least one.
+    fn most_invocations(&self, kernel: &str, seconds: f64) -> u64 {
+        ((seconds / self.seconds_each(kernel)) as u64).max(1)
+    }
+
+    /// Learns how long invocations of a kernel take: from many, and by no more than a factor of four at once after the first time.
+    fn learn(&self, kernel: &str, invocations: f64, seconds: f64) {
+        if invocations >= TOO_FEW && seconds > 0.0 {
+            let common = self.common::<Costs>();
+            let mut costs = lock(&common.0);
+            let each = seconds / invocations;
+            let each = costs.get(kernel).map_or(each, |old| each.clamp(old / 4.0, old * 4.0));
+            costs.insert(kernel.to_owned(), each);
+        }
+    }
 }

@@ -1,157 +1,30 @@
-//! The GPU: finding an adapter, opening a device once per process, and waiting for it without hanging.
+//! The device: opened once per process, its textures and buffers, and waiting for it without hanging.
 
 use std::any::{Any, TypeId};
 use std::collections::HashMap;
 use std::ops::Range;
-use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError};
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use crate::cache::Pipelines;
-use crate::constants::constants;
+use super::adapter::{self, AdapterInfo, check_fork, choose, describe, enumerate, lock};
+use super::disk_cache::Pipelines;
+use super::link::Generated;
 use crate::error::{Error, Result};
-use crate::kernel::{Kernel, Key, Name, Program, Specialization};
-use crate::shader::{self, Linked};
+use crate::shared::constants;
 
-/// What an adapter says of itself.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct AdapterInfo {
-    /// Its name, such as `llvmpipe (LLVM 15.0.6, 256 bits)`.
-    pub name: String,
-    /// Driver and version.
-    pub driver: String,
-    /// `vulkan`, `metal` or `dx12`.
-    pub backend: String,
-    /// `discrete`, `integrated`, `virtual`, `cpu` or `other`.
-    pub kind: String,
-    /// PCI bus address, empty where there is none.
-    pub pci: String,
-}
+/// Asked while waiting: an error stops the work (Ctrl-C).
+pub type Interrupt<'a> = &'a dyn Fn() -> Result<()>;
 
-/// Seconds that an invocation is thought to take before any has been timed, on a processor and on a GPU: ten times as long as one
-/// of a march in `draft`, as long as one in `high`.
-const FIRST_GUESS: [f64; 2] = [3e-5, 1e-7];
-/// Invocations up to which a dispatch says nothing of how long one takes: launching it takes longer.
-const TOO_FEW: f64 = 1024.0;
 /// How long one submission, meant to take a tenth of a second, may take before the device counts as hung.
 const HUNG: Duration = Duration::from_secs(300);
 /// How long to wait between looks at the caller's interrupt.
 const SLICE: Duration = Duration::from_millis(100);
 
-/// Asked while waiting: an error stops the work (Ctrl-C).
-pub type Interrupt<'a> = &'a dyn Fn() -> Result<()>;
-
-static PROCESS: AtomicU32 = AtomicU32::new(0);
-static INSTANCE: OnceLock<wgpu::Instance> = OnceLock::new();
 // Never dropped: some drivers crash when a device goes away while the process exits.
 static OPEN: Mutex<Vec<(usize, Arc<Gpu>)>> = Mutex::new(Vec::new());
-
-/// Locks a mutex whose data no panic can leave half-written.
-pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// An error in a child that was forked after the driver had started threads: they do not exist there, and the first
-/// call would wait for them for ever.
-pub fn check_fork() -> Result<()> {
-    let ours = std::process::id();
-    match PROCESS.load(Ordering::Relaxed) {
-        0 => Ok(()),
-        pid if pid == ours => Ok(()),
-        _ => Err(Error::Fork),
-    }
-}
-
-/// What the environment should hold, by name, before anything loads the driver. It is for programs to set when they start:
-/// it cannot be set safely once there are threads.
-///
-/// Mesa's layer `VK_LAYER_MESA_device_select` asks Wayland for its device and prints an error for each instance where
-/// `XDG_RUNTIME_DIR` is no folder, as on every machine without a screen. It is left out there, unless the user has a say in
-/// it: adapters are chosen here by kind.
-pub fn driver_settings() -> Vec<(&'static str, &'static str)> {
-    let wayland = std::env::var_os("XDG_RUNTIME_DIR").is_some_and(|folder| std::path::Path::new(&folder).is_absolute());
-    let wished = ["NODEVICE_SELECT", "MESA_VK_DEVICE_SELECT", "MESA_VK_DEVICE_SELECT_FORCE_DEFAULT_DEVICE"];
-    let wished = wished.into_iter().any(|name| std::env::var_os(name).is_some());
-    if wayland || wished { Vec::new() } else { vec![("NODEVICE_SELECT", "1")] }
-}
-
-/// The adapters, best first: discrete, integrated, virtual, other, CPU.
-fn enumerate() -> Result<Vec<wgpu::Adapter>> {
-    check_fork()?;
-    PROCESS.store(std::process::id(), Ordering::Relaxed);
-    let instance = INSTANCE.get_or_init(|| {
-        let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
-        // Never OpenGL: it is not even compiled in.
-        descriptor.backends = wgpu::Backends::VULKAN | wgpu::Backends::METAL | wgpu::Backends::DX12;
-        wgpu::Instance::new(descriptor)
-    });
-    let mut adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()));
-    adapters.sort_by_key(|adapter| match adapter.get_info().device_type {
-        wgpu::DeviceType::DiscreteGpu => 0,
-        wgpu::DeviceType::IntegratedGpu => 1,
-        wgpu::DeviceType::VirtualGpu => 2,
-        wgpu::DeviceType::Other => 3,
-        wgpu::DeviceType::Cpu => 4,
-    });
-    Ok(adapters)
-}
-
-fn describe(adapter: &wgpu::Adapter) -> AdapterInfo {
-    let info = adapter.get_info();
-    let kind = match info.device_type {
-        wgpu::DeviceType::DiscreteGpu => "discrete",
-        wgpu::DeviceType::IntegratedGpu => "integrated",
-        wgpu::DeviceType::VirtualGpu => "virtual",
-        wgpu::DeviceType::Cpu => "cpu",
-        wgpu::DeviceType::Other => "other",
-    };
-    AdapterInfo {
-        name: info.name,
-        driver: format!("{} {}", info.driver, info.driver_info).trim().to_owned(),
-        backend: info.backend.to_str().to_owned(),
-        kind: kind.to_owned(),
-        pci: info.device_pci_bus_id,
-    }
-}
-
-/// The adapters that can be used, best first.
-pub fn adapters() -> Result<Vec<AdapterInfo>> {
-    Ok(enumerate()?.iter().map(describe).collect())
-}
-
-/// Which of `adapters` `wanted` means: an index, a kind, or a part of its name, driver or PCI address.
-fn choose(adapters: &[AdapterInfo], wanted: Option<&str>) -> Result<usize> {
-    let list = || {
-        let lines: Vec<_> = adapters
-            .iter()
-            .enumerate()
-            .map(|(i, a)| format!("  {i}: {} ({}, {}, {})", a.name, a.kind, a.backend, a.driver))
-            .collect();
-        if lines.is_empty() { "  none".to_owned() } else { lines.join("\n") }
-    };
-    if adapters.is_empty() {
-        return Err(Error::Adapter(
-            "no Vulkan adapter was found. Either the loader is missing, or no driver is installed, or a container hides \
-             the GPU (NVIDIA: NVIDIA_DRIVER_CAPABILITIES=graphics). A driver that needs no GPU: apt-get install \
-             mesa-vulkan-drivers libvulkan1"
-                .into(),
-        ));
-    }
-    let Some(wanted) = wanted.map(str::trim).filter(|wanted| !wanted.is_empty()) else { return Ok(0) };
-    let found = match wanted.parse::<usize>() {
-        Ok(index) => (index < adapters.len()).then_some(index),
-        Err(_) => {
-            let wanted = wanted.to_lowercase();
-            adapters.iter().position(|a| {
-                let pci = !a.pci.is_empty() && a.pci.to_lowercase() == wanted;
-                a.kind == wanted || pci || format!("{} {}", a.name, a.driver).to_lowercase().contains(&wanted)
-            })
-        }
-    };
-    found.ok_or_else(|| Error::Adapter(format!("no adapter matches {wanted:?}; found:\n{}", list())))
-}
 
 /// An open device with all that is shared by the renderers on it.
 pub struct Gpu {
@@ -171,10 +44,8 @@ pub struct Gpu {
     pub(crate) nothing: [wgpu::TextureView; 2],
     /// What renderers share, one of each type.
     shared: Mutex<HashMap<TypeId, Arc<dyn Any + Send + Sync>>>,
-    programs: Mutex<HashMap<&'static str, Arc<Program>>>,
-    kernels: Mutex<Kernels>,
-    /// Seconds that an invocation takes, by kernel.
-    costs: Mutex<HashMap<String, f64>>,
+    /// The modules of its shaders that are no files.
+    pub(crate) generated: Generated,
     submissions: AtomicU64,
     waits: AtomicU64,
     /// What the driver has compiled.
@@ -216,30 +87,6 @@ fn nothing(device: &wgpu::Device, dimension: wgpu::TextureDimension) -> wgpu::Te
     texture.create_view(&wgpu::TextureViewDescriptor::default())
 }
 
-/// A kernel that is there, or is being compiled by whoever holds the lock.
-type Slot = Arc<Mutex<Option<Arc<Kernel>>>>;
-
-/// The kernels of a device, each with the number of its last use.
-#[derive(Default)]
-struct Kernels {
-    slots: HashMap<Key, (Slot, u64)>,
-    uses: u64,
-}
-
-/// Most kernels that are kept: on lavapipe one takes 2 to 3 MB, and a picture has ten to thirty.
-const MOST_KERNELS: usize = 48;
-
-impl Kernels {
-    /// Forgets those whose last use is longest ago, where there are too many.
-    fn forget(&mut self) {
-        while self.slots.len() > MOST_KERNELS {
-            let Some(oldest) = self.slots.iter().min_by_key(|(_, (_, last_use))| *last_use) else { return };
-            let key = oldest.0.clone();
-            self.slots.remove(&key);
-        }
-    }
-}
-
 #[derive(Default)]
 struct Failure {
     /// The first error that no call has reported yet.
@@ -248,8 +95,8 @@ struct Failure {
 }
 
 impl Gpu {
-    /// The device of the adapter that `wanted` means, opened on first use; with none, the best.
-    pub fn open(wanted: Option<&str>) -> Result<Arc<Self>> {
+    /// The device of the adapter that `wanted` means, opened on first use with the generated modules of its shaders; with none, the best.
+    pub(crate) fn open_with(wanted: Option<&str>, generated: Generated) -> Result<Arc<Self>> {
         check_fork()?;
         let adapters = enumerate()?;
         let infos: Vec<_> = adapters.iter().map(describe).collect();
@@ -259,18 +106,18 @@ impl Gpu {
         if let Some((_, gpu)) = open.iter().find(|(i, _)| *i == index) {
             return Ok(gpu.clone());
         }
-        let gpu = Arc::new(Self::new(&adapters[index], infos[index].clone())?);
+        let gpu = Arc::new(Self::new(&adapters[index], infos[index].clone(), generated)?);
         open.push((index, gpu.clone()));
         Ok(gpu)
     }
 
     /// What a window needs that shows pictures of this device without bringing them to memory.
     pub fn shared(&self) -> (wgpu::Instance, wgpu::Adapter, wgpu::Device, wgpu::Queue) {
-        let instance = INSTANCE.get().expect("a device was opened through it").clone();
+        let instance = adapter::instance().clone();
         (instance, self.adapter.clone(), self.device.clone(), self.queue.clone())
     }
 
-    fn new(adapter: &wgpu::Adapter, info: AdapterInfo) -> Result<Self> {
+    fn new(adapter: &wgpu::Adapter, info: AdapterInfo, generated: Generated) -> Result<Self> {
         let offered = adapter.limits();
         // What the code needs and no more, but as long a buffer as there is: it bounds the size of `animate`'s frames.
         // `march` names 17 textures; Vulkan promises 16, drivers have 96 and more. `reproject` names 10 buffers; Vulkan promises
@@ -341,9 +188,7 @@ impl Gpu {
             nothing: [wgpu::TextureDimension::D2, wgpu::TextureDimension::D3]
                 .map(|dimension| nothing(&device, dimension)),
             shared: Mutex::default(),
-            programs: Mutex::default(),
-            kernels: Mutex::default(),
-            costs: Mutex::default(),
+            generated,
             submissions: AtomicU64::new(0),
             waits: AtomicU64::new(0),
             pipelines,
@@ -355,48 +200,6 @@ impl Gpu {
         })
     }
 
-    /// A pass, linked and validated on first use.
-    fn program(&self, pass: &'static str) -> Result<Arc<Program>> {
-        let known = lock(&self.programs).get(pass).cloned();
-        if let Some(program) = known {
-            return Ok(program);
-        }
-        let program = Arc::new(Program::new(self, pass)?);
-        Ok(lock(&self.programs).entry(pass).or_insert(program).clone())
-    }
-
-    fn slot(&self, name: Name, specialization: &Specialization) -> Result<(Arc<Program>, Slot)> {
-        let program = self.program(name.0)?;
-        let key = program.key(name, specialization)?;
-        let mut kernels = lock(&self.kernels);
-        let use_number = kernels.uses;
-        kernels.uses += 1;
-        let (slot, last_use) = kernels.slots.entry(key).or_default();
-        *last_use = use_number;
-        let slot = slot.clone();
-        kernels.forget();
-        Ok((program, slot))
-    }
-
-    /// A kernel, compiled on first use.
-    pub(crate) fn kernel(&self, name: Name, specialization: &Specialization) -> Result<Arc<Kernel>> {
-        let (program, slot) = self.slot(name, specialization)?;
-        let mut slot = lock(&slot);
-        if let Some(kernel) = &*slot {
-            return Ok(kernel.clone());
-        }
-        let kernel = Arc::new(program.compile(self, name.1, specialization)?);
-        *slot = Some(kernel.clone());
-        Ok(kernel)
-    }
-
-    /// Whether a kernel is there already.
-    pub(crate) fn is_compiled(&self, name: Name, specialization: &Specialization) -> Result<bool> {
-        let (_, slot) = self.slot(name, specialization)?;
-        // One that is being compiled is locked.
-        Ok(slot.try_lock().is_ok_and(|slot| slot.is_some()))
-    }
-
     /// What all renderers of the device share of a type.
     pub(crate) fn common<T: Any + Send + Sync + Default>(&self) -> Arc<T> {
         let mut shared = lock(&self.shared);
@@ -404,42 +207,9 @@ impl Gpu {
         slot.clone().downcast().expect("is kept by its type")
     }
 
-    /// Seconds that an invocation of a kernel takes.
-    pub(crate) fn seconds_each(&self, kernel: &str) -> f64 {
-        let [processor, other] = FIRST_GUESS;
-        let guess = if self.info.kind == "cpu" { processor } else { other };
-        lock(&self.costs).get(kernel).copied().unwrap_or(guess)
-    }
-
-    /// How many invocations of a kernel take so many seconds, at least one.
-    pub(crate) fn most_invocations(&self, kernel: &str, seconds: f64) -> u64 {
-        ((seconds / self.seconds_each(kernel)) as u64).max(1)
-    }
-
-    /// Learns how long invocations of a kernel take: from many, and by no more than a factor of four at once after the first time.
-    pub(crate) fn learn(&self, kernel: &str, invocations: f64, seconds: f64) {
-        if invocations >= TOO_FEW && seconds > 0.0 {
-            let mut costs = lock(&self.costs);
-            let each = seconds / invocations;
-            let each = costs.get(kernel).map_or(each, |old| each.clamp(old / 4.0, old * 4.0));
-            costs.insert(kernel.to_owned(), each);
-        }
-    }
-
     /// How many submissions the device has had, and how often one was waited for.
     pub fn counters(&self) -> [u64; 2] {
         [&self.submissions, &self.waits].map(|counter| counter.load(Ordering::Relaxed))
-    }
-
-    /// Forgets what has been compiled, so that the shaders are read anew (`NUBIS_SHADERS`). Where one is broken all stays as it is,
-    /// and the error names its file and line.
-    pub fn reload_shaders(&self) -> Result<()> {
-        for name in shader::names() {
-            Linked::new(name).and_then(|linked| linked.parse().map(drop)).map_err(Error::File)?;
-        }
-        lock(&self.programs).clear();
-        lock(&self.kernels).slots.clear();
-        Ok(())
     }
 
     /// The first error since the last call, if any.

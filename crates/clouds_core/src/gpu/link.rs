@@ -1,0 +1,105 @@
+//! WGSL files and how they find each other: `#import name` on a line of its own brings in the whole of a file, once.
+
+use std::collections::HashSet;
+use std::path::Path;
+
+include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
+
+/// The text of a module that is no file: written from what Rust declares.
+pub(crate) type Generated = fn(&str) -> Option<String>;
+
+/// One self-contained WGSL module, and where each of its lines came from.
+pub struct Linked {
+    /// The WGSL.
+    pub code: String,
+    lines: Vec<(String, usize)>,
+}
+
+impl Linked {
+    /// Links the file called `root` with all that it imports. WGSL ignores the order of declarations, so importing is
+    /// appending.
+    pub(crate) fn new(root: &str, generated: Generated) -> Result<Self, String> {
+        let source = read(root, generated).ok_or_else(|| missing(root))?;
+        Self::of(root, &source, generated)
+    }
+
+    /// Links `source`, which is no file, with all that it imports.
+    pub(crate) fn from_source(source: &str, generated: Generated) -> Result<Self, String> {
+        Self::of("(source)", source, generated)
+    }
+
+    fn of(root: &str, source: &str, generated: Generated) -> Result<Self, String> {
+        let mut linked = Self { code: String::new(), lines: Vec::new() };
+        let mut queue = vec![(root.to_owned(), source.to_owned())];
+        let mut seen = HashSet::from([root.to_owned()]);
+        while let Some((file, source)) = queue.pop() {
+            for (number, line) in source.lines().enumerate() {
+                match line.strip_prefix("#import ") {
+                    Some(import) if seen.insert(import.to_owned()) => {
+                        let source = read(import, generated).ok_or_else(|| format!("{file}: {}", missing(import)))?;
+                        queue.push((import.to_owned(), source));
+                    }
+                    Some(_) => {}
+                    None => {
+                        linked.code += line;
+                        linked.code.push('\n');
+                        linked.lines.push((file.clone(), number + 1));
+                    }
+                }
+            }
+        }
+        Ok(linked)
+    }
+
+    /// The file and line that line `number` of the linked code came from.
+    pub fn origin(&self, number: usize) -> String {
+        let (file, line) = &self.lines[number - 1];
+        match std::env::var_os(FOLDER) {
+            Some(folder) => format!("{}:{line}", Path::new(&folder).join(format!("{file}.wgsl")).display()),
+            None => format!("shaders/wgsl/{file}.wgsl:{line}"),
+        }
+    }
+
+    /// Parses and validates the module; errors name the file and line that the text came from.
+    pub fn parse(&self) -> Result<(wgpu::naga::Module, wgpu::naga::valid::ModuleInfo), String> {
+        use wgpu::naga::{front::wgsl, valid};
+        let module = wgsl::parse_str(&self.code).map_err(|error| {
+            let line = error.location(&self.code).map_or(1, |at| at.line_number as usize);
+            format!("{}: {}", self.origin(line), error.emit_to_string(&self.code))
+        })?;
+        // pack2x16float, which every backend that we open has.
+        let capabilities = valid::Capabilities::default() | valid::Capabilities::SHADER_FLOAT16_IN_FLOAT32;
+        let info =
+            valid::Validator::new(valid::ValidationFlags::all(), capabilities).validate(&module).map_err(|error| {
+                let line = error.location(&self.code).map_or(1, |at| at.line_number as usize);
+                format!("{}: {}", self.origin(line), error.emit_to_string(&self.code))
+            })?;
+        Ok((module, info))
+    }
+}
+
+/// The text of a WGSL file or of a generated module.
+pub(crate) fn read(name: &str, generated: Generated) -> Option<String> {
+    let file = || match std::env::var_os(FOLDER) {
+        // For work on shaders: read from a folder, without building anything again.
+        Some(folder) => std::fs::read_to_string(Path::new(&folder).join(format!("{name}.wgsl"))).ok(),
+        None => SHADERS.iter().find(|(file, _)| *file == name).map(|(_, source)| (*source).to_owned()),
+    };
+    generated(name).or_else(file)
+}
+
+/// The environment variable with the folder that shaders are read from.
+const FOLDER: &str = "NUBIS_SHADERS";
+
+/// An error for a file that [`read`] does not find.
+fn missing(name: &str) -> String {
+    match std::env::var_os(FOLDER) {
+        Some(folder) => format!("{FOLDER} = {folder:?} has no file {name}.wgsl that can be read"),
+        None => format!("no shader named {name:?}"),
+    }
+}
+
+/// Every WGSL file by name.
+pub fn names() -> impl Iterator<Item = &'static str> {
+    SHADERS.iter().map(|(name, _)| *name)
+}

@@ -47,7 +47,9 @@ def shader_hash() -> str:
     for file in sorted(folder.rglob("*.wgsl")):
         digest.update(file.relative_to(folder).as_posix().encode() + b"\0" + file.read_bytes())
     for file in sorted((ROOT / "crates" / "clouds_core" / "src").rglob("*.rs")):
-        for block in re.findall(rb"^constants! \{.*?^\}", file.read_bytes(), re.DOTALL | re.MULTILINE):
+        for block in re.findall(
+            rb"^constants! \{.*?^\}", file.read_bytes(), re.DOTALL | re.MULTILINE
+        ):
             digest.update(block)
     return digest.hexdigest()[:16]
 

@@ -106,7 +106,11 @@ def test_no_copies(path):
 
 
 def test_copies_are_found():
-    for comment in ("const A = 4u; // as in a.rs\n", "// As in `passes/a.wgsl`.\n", "/// as\n/// in a.rs).\n"):
+    for comment in (
+        "const A = 4u; // as in a.rs\n",
+        "// As in `passes/a.wgsl`.\n",
+        "/// as\n/// in a.rs).\n",
+    ):
         assert len(copied(comment)) == 1, comment
     assert not copied("// As color.rs does, in 8 bits (a.rs), as in passes/march.\n")
 

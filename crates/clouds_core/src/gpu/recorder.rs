@@ -450,6 +450,8 @@ impl<'a> Submission<'a> {
         };
         let seconds = extent.likely() * self.gpu.seconds_each(&kernel.label);
         if self.seconds > 0.0 && self.seconds + seconds > SLICE_SECONDS {
+            // Lavapipe has done what it is handed before it takes it (Mesa 22.3): no wait there is so long that it asks.
+            (self.interrupt)()?;
             let before = self.in_flight.take();
             self.submit();
             // So that no more than two slices are on their way, of which an interrupt ends the second only.

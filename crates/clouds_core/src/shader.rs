@@ -40,6 +40,11 @@ pub fn link(name: &str) -> std::result::Result<Linked, String> {
     Linked::new(name, generated)
 }
 
+/// Links WGSL that is no file with all that it imports.
+pub fn link_source(source: &str) -> std::result::Result<Linked, String> {
+    Linked::from_source(source, generated)
+}
+
 /// The modules that are no files.
 fn generated(name: &str) -> Option<String> {
     match name {

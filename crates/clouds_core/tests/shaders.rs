@@ -69,7 +69,7 @@ fn shaders_read_each_constant_of_rust() {
 #[test]
 fn errors_name_the_file_and_line() {
     let source = "#import math\nfn broken() -> f32 {\n    return missing;\n}\n";
-    let error = Linked::from_source(source).expect("links").parse().expect_err("is invalid");
+    let error = shader::link_source(source).expect("links").parse().expect_err("is invalid");
     assert!(error.contains("(source).wgsl:3"), "{error}");
 }
 

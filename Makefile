@@ -18,7 +18,7 @@ export VIRTUAL_ENV := $(CURDIR)/$(VENV)
 unexport CONDA_PREFIX
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help setup build generate render gallery steps demo window test test-all stress types lint bench bench-kernels heat profile motion soak packages clean
+.PHONY: help setup build generate render gallery steps demo window test test-slow test-all stress types lint bench bench-kernels heat profile motion soak packages clean
 
 help: ## List the commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -86,10 +86,18 @@ window: setup
 	"$${run[@]}" apt-get update -qq && \
 	"$${run[@]}" apt-get install -qq --no-install-recommends "$${missing[@]}" > /dev/null
 
-test: types window ## Run all tests; needs no GPU
+# Two processes: most of the time Mesa compiles kernels, which it does on one thread.
+PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
+
+test: types window ## Run the tests of the first tier (8 min on two cores); needs no GPU
 	cargo test --release
 	cargo test --release -p clouds_demo
-	$(BIN)/python -m pytest
+	$(PYTEST) -m 'not slow'
+
+test-slow: build window ## Run those of the second: what takes long for what it guards
+	$(PYTEST) -m slow
+
+test-all: test test-slow ## Run all tests
 
 # EXAMPLES=2000 SEED=3 runs a slice. Pictures of skies at the ends of all ranges: half an hour on two cores.
 stress: export EXAMPLES := $(or $(EXAMPLES),21000)

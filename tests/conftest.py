@@ -1,5 +1,6 @@
 """One adapter for all tests, named in the header, and renderers that are made once and shared."""
 
+import collections
 import functools
 import os
 import shutil
@@ -49,15 +50,44 @@ def rng():
     return np.random.default_rng(20150809)
 
 
+@pytest.hookimpl(tryfirst=True)  # before `-m` looks at the marks
+def pytest_collection_modifyitems(items):
+    """Puts what `slow_after` says into the second tier, and the stress suite first: it keeps one of
+    two processes busy while the other does the rest.
+    """
+    items.sort(key=lambda item: "test_stress.py" not in item.nodeid)
+    cases = collections.Counter()
+    for item in items:
+        for mark in item.iter_markers("slow_after"):
+            test = item.nodeid.partition("[")[0]
+            cases[test] += 1
+            if cases[test] > mark.args[0]:
+                item.add_marker("slow")
+
+
 def pytest_unconfigure():
     shutil.rmtree(os.environ["NUBIS_CACHE"], ignore_errors=True)
 
 
+# Examples of the stress suite, by property: of this process, or of those that it has started.
+RAN = collections.Counter()
+
+
+def pytest_sessionfinish(session):
+    RAN.update(getattr(sys.modules.get("test_stress"), "RAN", {}))
+    if hasattr(session.config, "workeroutput"):
+        session.config.workeroutput["ran"] = dict(RAN)
+
+
+@pytest.hookimpl(optionalhook=True)  # of pytest-xdist
+def pytest_testnodedown(node):
+    RAN.update(getattr(node, "workeroutput", {}).get("ran", {}))
+
+
 def pytest_terminal_summary(terminalreporter):
     """How many examples the stress suite has run."""
-    ran = getattr(sys.modules.get("test_stress"), "RAN", {})
-    if ran:
+    if RAN:
         terminalreporter.section("stress")
-        for name, count in ran.items():
+        for name, count in RAN.items():
             terminalreporter.write_line(f"{count:7} {name}")
-        terminalreporter.write_line(f"{sum(ran.values()):7} examples")
+        terminalreporter.write_line(f"{sum(RAN.values()):7} examples")

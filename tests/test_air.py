@@ -192,6 +192,7 @@ DUSK = {
 }
 
 
+@pytest.mark.slow
 def test_dusk_does_not_pop():
     """In steps of a quarter of a degree, half of the sun's width, a picture changes by less than
     20 % in the mean and all but one in a hundred of its numbers by less than 50 %; in half the
@@ -208,6 +209,7 @@ def test_dusk_does_not_pop():
     assert np.percentile(fine, 99) < 0.65 * np.percentile(coarse, 99)
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("radius", [1e4, 400_000.0, 6_371_000.0, 1e9])
 @pytest.mark.parametrize("haze", [0.0, 20.0])
 def test_finite_everywhere(radius, haze):
@@ -258,6 +260,7 @@ def among_slabs(grid, **changes):
     return nubis.Params(volume=grid).with_(**{**base, **changes})
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("place", [1, 8, 24])
 def test_the_air_before_a_cloud(place):
     """What an opaque slab shows at 12 to 58 km: its own light through the air, and the light of the
@@ -329,6 +332,7 @@ def test_the_sun_sets_later_above():
     assert light[0] > 3 * light[2] > 0
 
 
+@pytest.mark.slow
 def test_methods_agree_in_air():
     """The march, the reference and paths of one scattering: the same air, the same light."""
     grid = slabs(2, 9, 20, extinction=4e-4)
@@ -370,6 +374,7 @@ def test_clouds_hide_the_sky_from_themselves():
     np.testing.assert_allclose(share(height, {"light.ambient_occlusion": 0.0}), height, atol=1e-6)
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("depth", [20.0, 60.0])
 def test_light_through_a_deck(depth):
     """What light from above comes out at the base of a deck, by paths through a slab of droplets:
@@ -427,6 +432,7 @@ def test_clouds_shade_the_ground_without_air(renderer):
     np.testing.assert_allclose(share, through + (1 - through) * 0.25, atol=0.02)
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("model", ["octaves", "path"])
 def test_ground_without_air_lights_clouds(renderer, model):
     """By the ground's radiance, whatever the air: all that a cloud has which the sun's light does
@@ -513,6 +519,7 @@ def test_optical_depth_of_haze():
     assert expected[HAZES.index(94.0)] == pytest.approx(0.5, abs=0.002)
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("elevation", [60.0, 3.0, -4.0])
 def test_every_haze_renders(renderer, elevation):
     """To the end of the range: no hole, and ever less of a dark ground is told from the sky."""

@@ -20,6 +20,7 @@ def colours(frame):
     return frame[..., :3]
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("scene", ["fair_weather", "above", "in_cloud"])
 def test_a_static_shot_becomes_the_still(renderer, scene):
     camera, params = nubis.scenes[scene]
@@ -55,6 +56,7 @@ MOVES = {
 }
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("move", MOVES)
 def test_what_moves_stays_near_the_still(renderer, move):
     """Loosely, at this size: neighbours that are marched in a frame are four pixels apart."""
@@ -69,6 +71,7 @@ def test_what_moves_stays_near_the_still(renderer, move):
             assert colours(frame).mean() == pytest.approx(still.mean(), rel=0.1)
 
 
+@pytest.mark.slow
 def test_a_panorama_has_no_seam(renderer):
     """What moves out at one side comes in at the other."""
     params = PARAMS.with_(
@@ -112,6 +115,7 @@ CUTS = {
 }
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("cut", CUTS)
 def test_a_cut_shows_nothing_of_the_shot_before(renderer, cut):
     make = renderer(*SIZE)
@@ -134,6 +138,7 @@ def test_the_same_animation_twice(renderer):
     assert once == twice
 
 
+@pytest.mark.slow
 def test_other_calls_in_between_change_nothing(renderer):
     shots = [MOVES["turn"](i) for i in range(6)]
     make = renderer(*SIZE)
@@ -146,6 +151,7 @@ def test_other_calls_in_between_change_nothing(renderer):
     assert alone == disturbed
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("size", [(1, 1), (5, 3), (33, 17)])
 def test_sizes_that_four_does_not_divide(renderer, size):
     make = renderer(*size)

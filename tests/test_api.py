@@ -46,6 +46,7 @@ def test_there_are_scenes():
         nubis.scenes["fair_weather"] = None
 
 
+@pytest.mark.slow_after(2)
 @pytest.mark.parametrize("scene", nubis.scenes)
 def test_a_picture(renderer, scene):
     camera, params = nubis.scenes[scene]
@@ -68,6 +69,7 @@ def test_layers(renderer):
     assert is_picture(layers["sky"], (36, 64, 3))
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("call", ["density", "sun_transmittance"])
 def test_answers_at_points(renderer, call):
     ask = getattr(renderer(), call)
@@ -322,6 +324,7 @@ except KeyboardInterrupt:
 """
 
 
+@pytest.mark.slow
 def test_ctrl_c_stops_a_long_render():
     """A render of minutes, interrupted after a second, ends within another two; the renderer can
     still be used.

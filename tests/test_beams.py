@@ -86,6 +86,7 @@ VIEWS = [
 ]
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("sun, pitch, eye", VIEWS)
 def test_where_shadows_are_as_smooth_as_their_levels(renderer, sun, pitch, eye):
     """To the ground or to space, from below and from above: 12 % of what the air lacks, RMS, which
@@ -98,6 +99,7 @@ def test_where_shadows_are_as_smooth_as_their_levels(renderer, sun, pitch, eye):
     assert twin.relative_rmse(lack(camera, params, time=60.0)[SOME], expected) < 0.12
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("sun, pitch, eye", VIEWS)
 def test_among_clouds_with_detail(renderer, sun, pitch, eye):
     """`fair_weather`, whose shadows have edges finer than 64 m: 3 % of the sky, RMS; toward a sun
@@ -115,6 +117,7 @@ def test_among_clouds_with_detail(renderer, sun, pitch, eye):
     assert np.sqrt(np.mean(expected**2)) > 1.4 * error * bright
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("distance", [2000.0, 8000.0, 30_000.0])
 def test_before_a_scene(renderer, distance):
     """The air before a black scene, as before clouds at that distance: 12 %."""
@@ -127,6 +130,7 @@ def test_before_a_scene(renderer, distance):
     assert twin.relative_rmse(lack(camera, params, **scene)[SOME], expected) < 0.12
 
 
+@pytest.mark.slow
 def test_shadow_of_a_grid(renderer):
     """A box that lets nothing through, with a sharp edge: 20 % of what the air under it lacks."""
     grid = nubis.DensityGrid(np.full((2, 2, 2), 0.1), ((-2e4, 1000, 1500), (2e4, 9000, 2500)))
@@ -138,6 +142,7 @@ def test_shadow_of_a_grid(renderer):
     assert twin.relative_rmse(lack(camera, params)[SOME], expected) < 0.2
 
 
+@pytest.mark.slow
 def test_clouds_are_seen_through_shaded_air():
     """A black wall of cloud behind a box's shadow has the same air before it as a scene there."""
     data = np.zeros((12, 40, 2), dtype=np.float32)
@@ -162,6 +167,7 @@ def test_clouds_are_seen_through_shaded_air():
     np.testing.assert_allclose(got, expected, rtol=0.05, atol=0.05 * expected.mean())
 
 
+@pytest.mark.slow
 def test_switched_off_nothing_is_shaded():
     """Nor in a clear sky, at night, without air, or over the clouds: the pictures are the same."""
     camera, params = nubis.scenes["fair_weather"]
@@ -193,6 +199,7 @@ def test_switched_off_nothing_is_shaded():
     np.testing.assert_allclose(a, b, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_picture_of_any_size():
     """Four times the pixels: the same beams, to 2 % of the sky."""
     params = smooth(**{"sun.elevation": 20.0, "sun.azimuth": 20.0})
@@ -203,6 +210,7 @@ def test_a_picture_of_any_size():
     assert large.std() > 0.05 * sky(camera, params, (80, 45)).mean()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["equirect", "fisheye", "narrow", "wide"])
 def test_every_camera_sees_the_same(kind):
     """What one pixel of it sees, a camera that looks that way alone sees too: 5 %."""
@@ -237,6 +245,7 @@ def test_a_panorama_has_no_seam():
     assert 0 < seam < 1.3 * max(beside)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("height", [-300.0, 0.0, 2000.0, 9000.0, 60_000.0, 4e5])
 def test_finite_everywhere(height):
     ours = nubis.Renderer(16, 8, quality=CHEAP)
@@ -282,6 +291,7 @@ def test_pictures_do_not_depend_on_those_before():
     assert np.array_equal(image, fresh.render(looking(40.0), params, time=3.0))
 
 
+@pytest.mark.slow
 def test_shadows_stay_as_they_are_baked_anew():
     """On either side of the eye's step of 600 m, and of the wind's of 32 m, nearly the same: were
     they to jump as far, they would change by 11 and 1 %.

@@ -143,6 +143,7 @@ def test_references_are_stored(tmp_path, monkeypatch):
     assert (anew["radiance"] == first["radiance"]).all() and len(list(tmp_path.iterdir())) == 2
 
 
+@pytest.mark.slow
 def test_quick_run(quick):
     results = json.loads((quick / "results.json").read_text())
     head, rows = results["header"], results["rows"]
@@ -227,6 +228,7 @@ def test_geometric_mean():
     assert mean["bias"] == pytest.approx(0.2) and mean["t_max"] == 0.3 and mean["flip"] is None
 
 
+@pytest.mark.slow
 def test_soak(tmp_path, monkeypatch):
     """Two short shots."""
     monkeypatch.setattr(soak, "SHOT", 6)
@@ -271,6 +273,7 @@ def panels():
     return {panel.name: panel.reads for panel in heat.panels(*FAIR, (64, 280))}
 
 
+@pytest.mark.slow
 def test_reads_are_counted():
     """Each texture by itself, all together, and the light samples by what they must read."""
     camera, params = PLAIN
@@ -314,6 +317,7 @@ def test_what_counts_is_known(tmp_path, monkeypatch):
         counts.counting_shaders(tmp_path / "copy")
 
 
+@pytest.mark.slow
 def test_no_optimisation_in_closed_form(panels):
     """Every step of a ray reads 4 texels for itself and 22 for its light: 64 steps straight up,
     128 toward the horizon, and one twice where the way to the first cloud ends.
@@ -369,6 +373,7 @@ def cells(table):
     return [[cell.strip() for cell in line] for line in lines[2:]]
 
 
+@pytest.mark.slow
 def test_profile(tmp_path, capsys):
     path = tmp_path / "profile.json"
     profile.main(["--size", "64x280", "--repeats", "1", "--out", str(path)])

@@ -71,6 +71,7 @@ def test_the_next_process_bakes_nothing_and_sees_the_same(filled, baked):
     assert (noise.read_bytes(), weather.read_bytes()) == before
 
 
+@pytest.mark.slow
 def test_another_seed_is_another_file(filled, baked):
     picture, kernels = render(filled, seed=6)
     assert picture != baked and kernels >= NOISE
@@ -84,6 +85,7 @@ def test_another_finer_detail_is_baked_alone(filled, baked):
     assert len(files(filled, "noise")) == 1 and len(files(filled, "finer_detail")) == 2
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("damage", ["truncated", "empty", "flipped", "longer", "foreign"])
 def test_damaged_files_are_made_again(filled, baked, damage):
     good = {path: path.read_bytes() for path in filled.iterdir()}
@@ -103,6 +105,7 @@ def test_damaged_files_are_made_again(filled, baked, damage):
     assert {path: path.read_bytes() for path in filled.iterdir()} == good
 
 
+@pytest.mark.slow
 def test_folders_in_the_place_of_files(filled, baked):
     for path in list(filled.iterdir()):
         path.unlink()
@@ -110,6 +113,7 @@ def test_folders_in_the_place_of_files(filled, baked):
     assert render(filled)[0] == baked
 
 
+@pytest.mark.slow
 def test_a_file_of_another_key_is_not_read(filled):
     """Names are short hashes: what says whose a file is stands in the file."""
     [path] = files(filled, "noise")
@@ -121,6 +125,7 @@ def test_a_file_of_another_key_is_not_read(filled):
     assert again == picture and kernels >= NOISE - FINER
 
 
+@pytest.mark.slow
 def test_processes_at_once(tmp_path, baked):
     code = RENDER.format(seed=5, finer=0.6)
     env = os.environ | {"NUBIS_CACHE": str(tmp_path)}
@@ -136,6 +141,7 @@ def test_processes_at_once(tmp_path, baked):
     assert picture == baked and not kernels & NOISE
 
 
+@pytest.mark.slow
 def test_a_folder_that_cannot_be_written(tmp_path, baked):
     """A file stands where the folder should: nobody can write there, root included."""
     (tmp_path / "file").write_text("mine")
@@ -144,6 +150,7 @@ def test_a_folder_that_cannot_be_written(tmp_path, baked):
     assert (tmp_path / "file").read_text() == "mine"
 
 
+@pytest.mark.slow
 def test_off_nothing_is_kept(monkeypatch, tmp_path):
     monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
@@ -178,6 +185,7 @@ for seed in {seeds}:
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.slow
 def test_what_was_used_last_stays(filled):
     render_seeds(filled, range(100, 104))
     assert not render(filled)[1] & NOISE
@@ -187,6 +195,7 @@ def test_what_was_used_last_stays(filled):
     assert sum(file.stat().st_size for file in filled.iterdir()) < 200e6
 
 
+@pytest.mark.slow
 def test_of_thousands_of_seeds_the_first_are_kept(tmp_path):
     render_seeds(tmp_path, range(9))
     assert len(files(tmp_path, "noise")) < 8

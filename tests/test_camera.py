@@ -37,6 +37,7 @@ def test_equirect(renderer, pixel):
     assert brightest(renderer, Camera.equirect((0, 0, 2)), azimuth, elevation, size) == pixel
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fov", [180.0, 120.0])
 @pytest.mark.parametrize(
     ("azimuth", "side"), [(0, "top"), (90, "left"), (180, "bottom"), (270, "right"), (30, "top")]
@@ -73,6 +74,7 @@ def test_fisheye_that_looks_at_the_horizon(renderer):
     assert x < 30 and y < 30
 
 
+@pytest.mark.slow
 def test_fisheye_shows_nothing_outside_its_circle(renderer):
     image = renderer(96, 64).render(Camera.fisheye((0, 0, 2)), nubis.Params())
     y, x = np.mgrid[:64, :96] + 0.5
@@ -137,6 +139,7 @@ def test_matrices(renderer, eye, target, up):
         np.testing.assert_allclose(other, pictures[0], rtol=1e-2, atol=1e-3)
 
 
+@pytest.mark.slow
 def test_projections_agree(renderer):
     """One direction, three projections of equal pixels: the same clouds."""
     params = nubis.Params().with_(**{"clouds.coverage": 0.7, "sun.visible": False})

@@ -98,6 +98,7 @@ def other_winds(rng, **changes):
     return Params().with_(**(winds | changes))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("easing", ["linear", "smooth"])
 def test_the_way_between_keys_is_the_integral_of_the_winds(rng, easing):
     """Of three skies with winds of any direction, in hours, a day's way, to the millimetre: `at`
@@ -132,6 +133,7 @@ def test_a_straight_change_of_speed_has_a_closed_form():
     assert place(keys.at(3 * HOUR), 3 * HOUR)[0] == pytest.approx(54 * HOUR, abs=1e-7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("easing", ["linear", "smooth"])
 def test_gusts_are_carried_on_by_the_period_of_each_moment(easing):
     """The velocity, by central differences of the way, is the wind of the moment in gusts of the
@@ -220,6 +222,7 @@ def view():
     return nubis.Camera.look_at((0, 0, 500), (0, 1000, 900), fov_y=80)
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("path", MEMBERS)
 def test_frames_change_as_with_a_steady_wind(renderer, path):
     """A change within half a minute after ten hours: from one second to the next a picture changes
@@ -244,6 +247,7 @@ def test_frames_change_as_with_a_steady_wind(renderer, path):
     assert 0 < changing < 1.5 * steady
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("path", ["wind.speed", "high_clouds.speed", "wander.period"])
 def test_an_animation_goes_on_where_winds_change(renderer, path):
     """Shots with another wind each, as from a slider, and nothing said of where the sky is: after
@@ -291,6 +295,7 @@ def test_an_animation_adds_up_even_changes(renderer):
     assert frame.tobytes() == elsewhere.tobytes()
 
 
+@pytest.mark.slow
 def test_an_animation_of_keys_stays_near_the_still(renderer):
     """What says where the sky is is not carried on twice, and what follows the clouds from frame to
     frame follows them by the way that they went.

@@ -40,6 +40,7 @@ def visible(eye, rng, n):
     return twin.raised(cap, RADIUS, rng.uniform(0, 10_000, n)), most
 
 
+@pytest.mark.slow_after(4)
 @pytest.mark.parametrize("name", EYES)
 @pytest.mark.parametrize("away", [1e-2, 10.0, 1e4, 3e5])
 def test_places_beside_the_eye(rng, name, away):

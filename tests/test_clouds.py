@@ -39,6 +39,7 @@ def density_by_height(renderer, rng, params, heights, n=3000, reach=20_000.0):
     return extinction.reshape(len(heights), n).mean(axis=1) / params.clouds.extinction
 
 
+@pytest.mark.slow_after(2)
 @pytest.mark.parametrize("kind", [0.0, 0.25, 0.5, 0.75, 1.0])
 def test_types_stand_where_their_gradients_say(renderer, rng, kind):
     """nubis2015, figure 4.10: nothing where the gradient is 0, most where it is 1, and the more of

@@ -63,6 +63,7 @@ VIEWS = {
 }
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("view", VIEWS)
 def test_cells_cost_little_error(view):
     """1 % of the mean radiance and transmittance, of a pixel 5 % but for one in 2000."""
@@ -83,6 +84,7 @@ def test_cells_cost_little_error(view):
     assert not differs[::4, ::4].any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", ["fair_weather", "overcast", "above", "storm", "sunset"])
 def test_shadows_and_beams_behind_clouds(scene):
     """The sky and the ground with their shadows, whatever is marched before them."""
@@ -97,6 +99,7 @@ def test_shadows_and_beams_behind_clouds(scene):
 BETWEEN = 15.0 / 16.0
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("elevation", [45.0, 8.0])
 def test_fine_high_clouds(elevation):
     """Where cells are wider than streaks, those are worked out at each pixel, the air is not."""
@@ -120,6 +123,7 @@ def test_fine_shadows():
     assert 0.5 < np.mean(error > 1e-7) <= BETWEEN
 
 
+@pytest.mark.slow_after(2)
 @pytest.mark.parametrize("haze", [1.0, 12.0])
 @pytest.mark.parametrize("pitch", [0.0, 1.3, -2.05])
 def test_the_horizon_is_sharp(haze, pitch):
@@ -137,6 +141,7 @@ def test_the_horizon_is_sharp(haze, pitch):
     np.testing.assert_array_equal(few["sky"][middle], full["sky"][middle])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shift", [(0.0, 0.0), (2.0, 2.0), (1.5, 0.5), (1.5, -0.5)])
 @pytest.mark.parametrize("air", [True, False])
 def test_the_sun_between_corners(shift, air):
@@ -151,6 +156,7 @@ def test_the_sun_between_corners(shift, air):
     np.testing.assert_array_equal(few["sky"][disc], full["sky"][disc])
 
 
+@pytest.mark.slow
 def test_the_users_scene_is_exact():
     """Pixels of the scene are worked out, and those beside them."""
     y, x = np.mgrid[: SIZE[1], : SIZE[0]]
@@ -164,6 +170,7 @@ def test_the_users_scene_is_exact():
     assert (picture(few) != picture(full)).any()
 
 
+@pytest.mark.slow
 def test_the_nearer_of_high_and_marched_clouds_is_before():
     """High clouds below the marched ones, as thick as them."""
     params = nubis.scenes["overcast"][1].with_(
@@ -192,6 +199,7 @@ def test_what_opaque_clouds_hide_is_not_missed():
         np.testing.assert_allclose(image, picture(layers), rtol=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["preview", "draft"])
 def test_opaque_clouds_hide_what_is_behind(name):
     """The horizon, too, between whose ground and high clouds nothing is smooth."""
@@ -204,6 +212,7 @@ def test_opaque_clouds_hide_what_is_behind(name):
     np.testing.assert_allclose(whole[opaque], clouds[opaque], rtol=1e-5)
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("size", [(1, 1), (2, 7), (9, 1), (5, 6), (23, 18)])
 def test_sizes_that_four_does_not_divide(size):
     camera = looking(0.0, 12.0, 0.1 * size[1])

@@ -62,6 +62,7 @@ def picture(renderer):
     return render
 
 
+@pytest.mark.slow_after(1)
 @each(SWITCHES)
 def test_nothing_is_the_limit_of_little(picture, group, name):
     """A picture with 0 and one with next to 0, root mean square, of the mean of the picture as it
@@ -101,6 +102,7 @@ BORDERS = [
 ]
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize(("name", "value"), BORDERS, ids=str)
 @pytest.mark.parametrize("view", VIEWS, ids="-".join)
 def test_no_leap_where_something_begins(picture, view, name, value):
@@ -110,6 +112,7 @@ def test_no_leap_where_something_begins(picture, view, name, value):
     assert error < 1e-3
 
 
+@pytest.mark.slow
 def test_a_deck_begins_to_show_after_it_has_room(renderer):
     """The cover up to which the shell grows with a deck shows nothing of it at all."""
     method = nubis.quality("high").replace(contrast=0.0)
@@ -121,6 +124,7 @@ def test_a_deck_begins_to_show_after_it_has_room(renderer):
     np.testing.assert_array_equal(layers["transmittance"], clear["transmittance"])
 
 
+@pytest.mark.slow
 def test_anvils_have_room_in_little_rain(renderer):
     """With the widest anvils storms begin at a precipitation of 0.1: what `density` says of a
     column, a ray along it meets.

@@ -149,6 +149,7 @@ def link_or_copy(source, target):
         shutil.copy2(source, target)
 
 
+@pytest.mark.slow
 def test_what_the_diffs_make(tmp_path):
     """Both at once: it builds, its generated files and uniforms fit together, and pictures and
     densities are those of the tree but for the ring and where they are asked to differ.

@@ -72,6 +72,7 @@ def through_air(params, height=EYE[2]):
     return (through * weight).sum(axis=(0, 1)) / weight.sum(axis=(0, 1)) / mu.shape[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [2, 8, 64, 128, 257, 512, 1024, 2048])
 @pytest.mark.parametrize("elevation", [40.0, 3.0, 86.0, 90.0])
 def test_flux_of_the_disc_in_panoramas(renderer, width, elevation):
@@ -83,6 +84,7 @@ def test_flux_of_the_disc_in_panoramas(renderer, width, elevation):
     np.testing.assert_allclose(flux, expected, rtol=0.005)
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("azimuth", [0.0, 180.0, 179.9, -90.0, 180.1])
 def test_flux_across_the_seam_of_a_panorama(renderer, azimuth):
     params = clear(**{"sun.azimuth": azimuth, "atmosphere.enabled": False})
@@ -110,6 +112,7 @@ def test_flux_of_the_disc_in_pinholes(renderer, fov_y):
         np.testing.assert_allclose(flux, np.broadcast_to(expected, (5, 3)), rtol=0.005)
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("fov", [60.0, 180.0, 240.0])
 @pytest.mark.parametrize("size", [24, 96, 500])
 def test_flux_of_the_disc_in_fisheyes(renderer, fov, size):
@@ -125,6 +128,7 @@ def test_flux_of_the_disc_in_fisheyes(renderer, fov, size):
         np.testing.assert_allclose(flux, params.sun.irradiance, rtol=0.005)
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("fov_y", [1.2, 5.0, 25.0, 90.0])
 def test_each_pixel_has_its_share_of_the_disc(renderer, fov_y):
     """Against 40 x 40 places in each pixel: edge, limb and middle."""
@@ -183,6 +187,7 @@ def test_a_telephoto_disc_is_smooth(renderer):
     assert (row[x > 1.01] == 0).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("elevation", [40.0, 8.0, 0.5])
 def test_glow_around_the_sun_in_coarse_panoramas(renderer, elevation):
     """The mean of a fine panorama over each pixel near the sun: to 1.5 %."""
@@ -214,6 +219,7 @@ PEAKS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("peak", PEAKS)
 @pytest.mark.parametrize("model", ["single", "octaves"])
 def test_peaks_of_phase_functions_in_wide_pixels(renderer, peak, model):

@@ -76,6 +76,7 @@ def test_paths_in_the_architecture():
     assert not missing
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
 def test_example(example, tmp_path):
     """It says what it shows, and runs from anywhere."""

@@ -71,6 +71,7 @@ def _run(code, **changes):
     return subprocess.run(command, capture_output=True, text=True, timeout=90, env=environment)
 
 
+@pytest.mark.slow_after(2)
 @pytest.mark.parametrize("end", ENDS)
 def test_the_interpreter_ends(end):
     for delay in (0.0, 0.013, 0.11):
@@ -99,6 +100,7 @@ nubis.Renderer(16, 9, quality="draft").render(*nubis.scenes["fair_weather"])
 """
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("folder", [None, "relative"])
 def test_no_word_without_a_screen(folder):
     done = _run(FIRST, XDG_RUNTIME_DIR=folder, NODEVICE_SELECT=None)

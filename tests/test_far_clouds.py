@@ -31,6 +31,7 @@ def seen(renderer, camera, size, quality="draft", params=CUMULUS):
     return 1 - layers["transmittance"].mean(), layers["radiance"].mean()
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("height", [10.0, 9e3, 3e4, 4.02e5, 2e6, 3.6e7])
 @pytest.mark.parametrize("quality", ["draft", "high"])
 def test_overcast_reaches_the_limb(renderer, height, quality):
@@ -53,6 +54,7 @@ def test_overcast_reaches_the_limb(renderer, height, quality):
         assert opacity > 0.97, f"{below} degrees from the horizon"
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("height", [3e4, 4.02e5, 2e6])
 def test_transmittance_from_afar(renderer, height):
     """Rays straight down and slanting, in float64, through a field that steps resolve."""
@@ -79,6 +81,7 @@ VIEWS = {
 }
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("view", VIEWS)
 def test_there_is_as_much_cloud_at_any_size(renderer, view):
     """Mean opacity to 0.02, and mean radiance to 5 %, whatever the size of the picture: where
@@ -91,6 +94,7 @@ def test_there_is_as_much_cloud_at_any_size(renderer, view):
     assert np.ptp(means[:, 1]) < 0.05 * means[-1, 1]
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("view", VIEWS)
 def test_there_is_as_much_cloud_by_any_method(renderer, view):
     camera, sizes = VIEWS[view]
@@ -101,6 +105,7 @@ def test_there_is_as_much_cloud_by_any_method(renderer, view):
     assert np.ptp(means[:, 1]) < 0.05 * means[-1, 1]
 
 
+@pytest.mark.slow
 def test_converged_and_traced_clouds_are_as_many(renderer):
     """One ray through each pixel, and one path in each of many places of it."""
     camera = straight_down(2e6, 20.0)
@@ -114,6 +119,7 @@ def test_converged_and_traced_clouds_are_as_many(renderer):
     assert np.ptp(means) < 0.03
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize(("height", "fov"), [(3e6, 40.0), (3.6e7, 8.0)])
 def test_clouds_smaller_than_pixels_do_not_speckle(renderer, height, fov):
     """A pixel that covers many clouds has their mean: neighbours differ by 0.2 at most, root mean

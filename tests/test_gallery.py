@@ -13,6 +13,7 @@ from docs import gallery
 PICTURES = [p for page in gallery.PAGES for p in gallery.pictures(gallery.read(page), page)]
 
 
+@pytest.mark.slow_after(2)
 @pytest.mark.parametrize("picture", PICTURES, ids=lambda picture: picture.name)
 def test_lines_make_a_picture(picture):
     frame = picture.shot().frame((32, 18), "draft")
@@ -20,6 +21,7 @@ def test_lines_make_a_picture(picture):
     assert nubis.to_srgb8(frame).std() > 5  # something is to be seen
 
 
+@pytest.mark.slow
 def test_no_two_blocks_make_the_same_picture(renderer):
     shots = [picture.shot() for picture in PICTURES]
     frames = {renderer(16, 9).render(*s[:2], time=s[2]).tobytes() for s in shots}

@@ -165,6 +165,7 @@ def test_no_evolution_freezes(kind):
     assert 0.01 < np.abs(moving[1] - moving[0]).mean() < np.abs(moving[2] - moving[0]).mean()
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("kind", [0.0, 1.0])
 def test_a_month_is_as_sharp_as_a_second(kind):
     """Differences of neighbouring texels, and the spread, after any time; also halfway between two
@@ -296,6 +297,7 @@ def test_high_clouds_stay_where_they_are(renderer, rng):
 SIZE = 32, 18
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("elevation", [20.0, 40.0, 75.0])
 @pytest.mark.parametrize("down", [False, True], ids=["from below", "from above"])
 def test_single_scattering_in_the_layer(renderer, elevation, down):
@@ -322,6 +324,7 @@ def test_single_scattering_in_the_layer(renderer, elevation, down):
     np.testing.assert_allclose(layers["radiance"][..., 0], expected, rtol=3e-3)
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("model", ["thesis2018", "nubis2015", "vsu2022", "octaves"])
 def test_overcast_is_grey_and_dark(renderer, model):
     """The thicker, the darker from below and the brighter from above; as bright as the sky that it
@@ -390,6 +393,7 @@ def test_light_changes_without_a_jump(renderer):
         assert np.abs(np.diff(steps)).max() < 2e-3, steps
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("down", [False, True], ids=["from below", "from above"])
 @pytest.mark.parametrize("kind", [0.0, 1.0])
 def test_emboss(renderer, down, kind):
@@ -461,6 +465,7 @@ def test_the_last_light_is_embossed(renderer):
 # --- Before and behind ------------------------------------------------------------------------
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("altitude", [800.0, 2000.0, 6000.0], ids=["below", "inside", "above"])
 @pytest.mark.parametrize(
     ("height", "pitch"), [(200.0, 25.0), (5000.0, -30.0), (12_000.0, -30.0), (30_000.0, -50.0)]

@@ -76,6 +76,7 @@ def test_far_from_the_origin(renderer, rng):
     np.testing.assert_allclose(got, expected, atol=2e-3)
 
 
+@pytest.mark.slow
 def test_a_ray_straight_up_sees_the_sky(renderer):
     """March, reference and path tracing alike: majorants know nothing of the spot, and need not."""
     eye = (*SPOT, 0.0)
@@ -119,6 +120,7 @@ def test_no_radius_is_no_spot(renderer):
     assert first == second
 
 
+@pytest.mark.slow
 def test_a_moving_spot_is_no_cut(renderer):
     """The frames of an animation follow it, near the stills."""
     camera = nubis.Camera.look_at((0, 0, 200), (0, 5000, 2000))

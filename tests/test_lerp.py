@@ -63,6 +63,7 @@ def test_no_room_for_a_deck():
     assert sky.upper_clouds.base >= sky.clouds.top
 
 
+@pytest.mark.slow
 @thorough
 @given(a=strategies.params(), b=strategies.params(), t=between)
 def test_between_any_two_skies(a, b, t):
@@ -114,6 +115,7 @@ def test_between_any_two_skies(a, b, t):
         assert (sky.weather, sky.weather_mix) == (later.weather, later.weather_mix)
 
 
+@pytest.mark.slow
 @thorough
 @given(a=strategies.params(), b=strategies.params())
 def test_both_ends(a, b):
@@ -121,6 +123,7 @@ def test_both_ends(a, b):
     assert lerp(a, b, 0) is a and lerp(a, b, 1) is b
 
 
+@pytest.mark.slow
 @thorough
 @given(a=strategies.params(), t=between)
 def test_between_a_sky_and_itself(a, t):

@@ -125,6 +125,7 @@ def all_sky_cover(make, params):
     return float(alpha[inside].mean())
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("preset", [None, "stratus", "cumulus", "storm"])
 def test_more_cover_is_more_cloud_in_the_picture(renderer, preset):
     """From clear to nearly all of the sky, and never less."""

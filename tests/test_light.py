@@ -36,6 +36,7 @@ CAMERAS = {
 }
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("g", [0.6, -0.4])
 @pytest.mark.parametrize("view", CAMERAS)
 def test_single_scattering(renderer, view, g):
@@ -77,6 +78,7 @@ def test_the_ground_hides_the_sun(renderer):
     np.testing.assert_array_equal(renderer().sun_transmittance(points, params), [0, 0, 0, 1])
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("model", MODELS)
 def test_radiance_follows_the_sun(renderer, model):
     """Twice the irradiance is twice the light of every model: all of it comes from the sun.
@@ -130,6 +132,7 @@ def test_single_scattering_has_no_artistic_part(renderer):
     assert plain.tobytes() == tinted.tobytes()
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("model", ["nubis2015", "thesis2018", "vsu2022", "octaves"])
 def test_ambient_light_alone(renderer, model):
     """Without sun, a cloud is as bright as the light around it where it hides it."""

@@ -44,6 +44,7 @@ def view_params(view, **changes):
     return camera, twin.smooth_params(**(values | changes))
 
 
+@pytest.mark.slow_after(3)
 @pytest.mark.parametrize("view", VIEWS)
 def test_transmittance(renderer, view):
     """The integral in float64 starts at the eye and knows nothing of shells."""
@@ -83,6 +84,7 @@ BOUNDS = {
 }
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("quality", BOUNDS)
 def test_methods_agree(renderer, quality):
     """The method is no part of the look: every one is near a converged picture, the better ones
@@ -104,6 +106,7 @@ def test_methods_agree(renderer, quality):
 SHARES = {"fair_weather": 0.03, "overcast": 0.023, "in_cloud": 0.03, "storm": 0.08}
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("scene", SHARES)
 def test_light_for_a_share_is_that_of_each_sample(renderer, scene):
     """Fewer looks at the sun, and nearly the same picture; less share, less error."""
@@ -126,6 +129,7 @@ def test_light_for_a_share_is_that_of_each_sample(renderer, scene):
     np.testing.assert_allclose(coarse["depth"], each["depth"], rtol=1e-4)
 
 
+@pytest.mark.slow
 def test_rain_is_lit_in_small_shares(renderer):
     """A tenth of a pixel of rain is kilometres of sun and shadow: were it lit as one, shafts had
     edges and an error of 14 %.
@@ -231,6 +235,7 @@ def _searching(**changes):
     return twin.fine(96, steps_horizon=192, empty_samples=6, **changes)
 
 
+@pytest.mark.slow_after(2)
 @pytest.mark.parametrize("seed", range(16))
 def test_leaps_find_the_clouds_of_any_sky(renderer, seed):
     """Against a march that leaves out no step, one that leaps loses no more than one with big steps
@@ -288,6 +293,7 @@ def test_leaps_find_the_clouds_of_any_sky(renderer, seed):
     assert leaps["samples"].sum() <= 1.02 * big["samples"].sum()
 
 
+@pytest.mark.slow
 def test_leaps_miss_no_small_cloud(renderer):
     """A sky with a tenth of cloud is searched by fewer samples; one from a map whose islands are a
     texel wide, which a leap could miss, is as well found.
@@ -314,6 +320,7 @@ def test_leaps_miss_no_small_cloud(renderer):
         assert leaps["samples"].sum() < (0.85 if sky is few else 1.0) * big["samples"].sum()
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize(
     ("scene", "changes", "big_step"),
     [
@@ -341,6 +348,7 @@ def test_nothing_leaps_where_it_does_not_know(renderer, scene, changes, big_step
         np.testing.assert_array_equal(on[name], off[name])
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("height", [30.0, 9000.0])
 def test_no_leap_goes_into_the_rain(renderer, height):
     """Rays that leap through clear air lose no more of rain and clouds than big steps do."""
@@ -413,6 +421,7 @@ def test_an_eye_at_sea_level_stands_on_the_ground(renderer, radius):
     np.testing.assert_allclose(at["sky"][9:], above["sky"][9:], rtol=1e-2)
 
 
+@pytest.mark.slow_after(2)
 @pytest.mark.parametrize("scene", nubis.scenes)
 def test_layers_belong_together(renderer, scene):
     camera, params = nubis.scenes[scene]
@@ -505,6 +514,7 @@ np.save('{path}', np.stack([renderer.render(camera, params), *frames]))
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="processes cannot be bound")
 def test_the_number_of_processors_does_not_show(tmp_path):
     pictures = []
@@ -516,6 +526,7 @@ def test_the_number_of_processors_does_not_show(tmp_path):
     np.testing.assert_array_equal(*pictures)
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("size", [(1, 1), (1, 64), (64, 1), (7, 5), (33, 17)])
 def test_any_size(renderer, size):
     camera, params = nubis.scenes["fair_weather"]
@@ -527,6 +538,7 @@ def test_any_size(renderer, size):
 HEIGHTS = [-5.0, 0.01, 1199.99, 1200.01, 3199.99, 3200.01, 20_000.0, 400_000.0, 4e7]
 
 
+@pytest.mark.slow_after(2)
 @pytest.mark.parametrize("height", HEIGHTS)
 def test_anywhere(renderer, height):
     """On the ground, a centimetre from each side of the shell, in orbit: finite and in range in
@@ -577,6 +589,7 @@ STRESS = [
 ]
 
 
+@pytest.mark.slow_after(2)
 @pytest.mark.parametrize(
     "changes", STRESS, ids=lambda changes: ", ".join(f"{k}={v:g}" for k, v in changes.items())
 )

@@ -17,6 +17,7 @@ def up(elevation=40.0, azimuth=120.0, **changes):
     return {"moon.elevation": elevation, "moon.azimuth": azimuth, **changes}
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("model", ["octaves", "single", "nubis2015", "path"])
 @pytest.mark.parametrize("background", ["sky", None])
 def test_moonlight_is_the_suns_light_path(renderer, model, background):
@@ -37,6 +38,7 @@ def test_moonlight_is_the_suns_light_path(renderer, model, background):
     np.testing.assert_array_equal(night[..., 3], day[..., 3])
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("background", ["sky", None])
 @pytest.mark.parametrize("sun", [-8.0, -4.5, 40.0])
 def test_sun_and_moon_shine_together(renderer, sun, background):
@@ -59,6 +61,7 @@ def test_sun_and_moon_shine_together(renderer, sun, background):
     np.testing.assert_allclose(together, expected, rtol=5e-3, atol=1e-3 * expected.max())
 
 
+@pytest.mark.slow
 def test_layers_of_both(renderer):
     """They make up the picture, as those of one light do; depth and transmittance know no light."""
     params = nubis.Params().with_(**{"sun.elevation": -7.0}, **up())
@@ -71,6 +74,7 @@ def test_layers_of_both(renderer):
         np.testing.assert_array_equal(layers[name], sunlit[name])
 
 
+@pytest.mark.slow
 def test_no_moon_by_default(renderer):
     """Nor does one far under the horizon change a byte."""
     make = renderer(32, 18)
@@ -81,6 +85,7 @@ def test_no_moon_by_default(renderer):
         np.testing.assert_array_equal(make.render(CAMERA, sunk), picture)
 
 
+@pytest.mark.slow
 def test_frames_of_both_are_their_stills(renderer):
     """An animation by two lights, of a static shot, and one whose lights come and go."""
     make = nubis.Renderer(32, 18, quality=nubis.quality("draft").replace(contrast=0.0))
@@ -95,6 +100,7 @@ def test_frames_of_both_are_their_stills(renderer):
         assert frame[..., :3].mean() == pytest.approx(expected, rel=0.5)
 
 
+@pytest.mark.slow
 def test_the_users_scene_shines_once(renderer):
     """Its radiance is not counted by each light."""
     params = nubis.Params().with_(**{"sun.elevation": -7.0}, **up(), **CLEAR)

@@ -71,6 +71,7 @@ HARDLY = {
 }
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("quality", ["draft", "balanced"])
 @pytest.mark.parametrize("change", HARDLY)
 def test_what_hardly_changes_becomes_the_still(change, quality):
@@ -83,12 +84,14 @@ def test_what_hardly_changes_becomes_the_still(change, quality):
     assert not ((last[..., 3] == 1) & (last[..., :3] == 0).all(axis=-1)).any()
 
 
+@pytest.mark.slow
 def test_a_sunset_that_hardly_changes_becomes_the_still():
     shots = [(look("sunset"), sky("sunset"), i * 1e-9) for i in range(18)]
     *_, last = nubis.Renderer(*SIZE, quality="draft").animate(shots, background=None)
     assert error(last, all_rays(shots[-1])) < 5e-3
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("scene", EYES)
 def test_a_flight_errs_no_more_than_its_stills(scene):
     """Against `high`; and no pixel is darker than half of the darkest around it in the still."""
@@ -113,6 +116,7 @@ JUMPS = {
 }
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("jump", JUMPS)
 def test_a_jump_leaves_nothing_behind(jump):
     before = (look("fair_weather"), sky("fair_weather"), 0.0)
@@ -126,6 +130,7 @@ def test_a_jump_leaves_nothing_behind(jump):
         assert error(frame, truth) < bound
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("scene", "field", "start", "step"),
     [
@@ -146,6 +151,7 @@ def test_a_slow_change_lags_by_less_than_two_percent(scene, field, start, step):
         assert error(frames[i], still) < error(rendered(shots[i]), still) + 0.12
 
 
+@pytest.mark.slow
 def test_turns_and_lapses_are_near_their_stills():
     """A turn of 5 degrees and a minute between two frames."""
     params = nubis.scenes["fair_weather"][1].with_(**{"high_clouds.coverage": 0.0})

@@ -71,6 +71,7 @@ def test_the_grid_is_the_one_that_was_stored(name):
     assert extinction.sum(dtype=np.float64) == pytest.approx(case["sum_of_grid"], rel=1e-6)
 
 
+@pytest.mark.slow_after(2)
 @pytest.mark.parametrize("name", EXACT)
 def test_stored_pictures_against_a_plain_marcher(name):
     """Equal steps in float64, with cameras, sun and phase function of this folder: conventions
@@ -127,6 +128,7 @@ def phase_over_pixels(case, fine=32):
     return sums[0] / sums[1] / phase(width, height)[0]
 
 
+@pytest.mark.slow_after(2)
 @pytest.mark.parametrize("name", EXACT)
 @pytest.mark.parametrize("quality", BOUNDS)
 def test_single_scattering(renderer, quality, name):
@@ -147,6 +149,7 @@ def test_single_scattering(renderer, quality, name):
     assert (layers["radiance"][dark] == 0).all()
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("name", ["blob_beside", "cumulus_inside", "rough_inside"])
 def test_order_of_convergence(renderer, name):
     """Equal steps, twice as many each time: the error falls with the square of the step, down to
@@ -167,6 +170,7 @@ def test_order_of_convergence(renderer, name):
     assert np.sqrt(np.mean((limit - want["transmittance"]) ** 2)) < 5e-5
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("name", grids.ALL)
 def test_density_and_sun(renderer, rng, name):
     """At points in the box, on its faces, and outside."""
@@ -214,6 +218,7 @@ def view_of_slab(cosine, azimuth, fov_y, thickness=100.0):
     return nubis.Camera.look_at(eye, eye + direction, (0, 0, 1), fov_y)
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("quality, atol", [("reference", 1e-5), ("balanced", 1e-4)])
 @pytest.mark.parametrize("shape", [(1, 1, 1), (2, 3, 5), (16, 4, 4)])
 def test_homogeneous_slab(renderer, quality, atol, shape):
@@ -228,6 +233,7 @@ def test_homogeneous_slab(renderer, quality, atol, shape):
         np.testing.assert_allclose(got, np.exp(-1 / cosine), atol=atol)
 
 
+@pytest.mark.slow_after(2)
 @pytest.mark.parametrize("down", [False, True])
 @pytest.mark.parametrize("height", [900.0, 1050.0, 1130.0, 1290.0, 1370.0, 1500.0])
 def test_linear_extinction(renderer, height, down):
@@ -254,6 +260,7 @@ def test_linear_extinction(renderer, height, down):
 SIDE = 1000.0
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("sun", ["above", "behind", "ahead"])
 @pytest.mark.parametrize("g", [0.0, 0.6, 0.9])
 def test_single_scattering_of_a_box(renderer, sun, g):
@@ -286,6 +293,7 @@ def test_single_scattering_of_a_box(renderer, sun, g):
         np.testing.assert_allclose(layers["radiance"][0, 0], expected, rtol=1e-4)
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("cosine", [0.5, -0.5])
 @pytest.mark.parametrize("depth", [0.01, 1.0, 8.0])
 def test_single_scattering_of_a_slab(renderer, depth, cosine):
@@ -352,6 +360,7 @@ def agree(image, error, expected, expected_error):
 SAMPLES = {"tau_5": 256, "events_4": 256, "tau_20": 128, "tau_60": 384}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MITSUBA)
 def test_path_tracer_against_mitsuba(renderer, name):
     case, want = stored(f"mitsuba_{name}")
@@ -361,6 +370,7 @@ def test_path_tracer_against_mitsuba(renderer, name):
     agree(image, error, want["tiles"], want["tiles_error"])
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("name", ["blob_beside", "cumulus_inside", "dense_front", "rough_inside"])
 def test_one_scattering_is_single_scattering(renderer, name):
     """Tiles and mean, and each pixel by itself: the errors are neither larger nor smaller than it
@@ -382,6 +392,7 @@ def slab_radiance(renderer, camera, params, samples):
     return image.mean(axis=(0, 1)), np.sqrt((error**2).mean(axis=(0, 1)) / 256)
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("direction", range(8))
 @pytest.mark.parametrize("name", SLABS)
 def test_path_tracer_against_disort(renderer, name, direction):
@@ -426,6 +437,7 @@ def test_chandrasekhar():
     np.testing.assert_allclose(got, [0.129893, 0.107075], atol=1e-6)
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("cosine", [0.3, 0.6, 0.9])
 @pytest.mark.parametrize("lit_by", ["sun", "sky"])
 def test_half_space(renderer, lit_by, cosine):
@@ -449,6 +461,7 @@ def test_half_space(renderer, lit_by, cosine):
     assert (np.abs(mean - expected) < 4 * error).all()
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("grid, scale", [("cumulus", 0.3), ("rough", 1.0)])
 @pytest.mark.parametrize("g", [0.0, 0.85])
 def test_white_furnace(renderer, grid, scale, g):

@@ -155,6 +155,7 @@ class TestInTheSky:
                     distance = np.minimum(distance, np.hypot(*(image - on).T))
         return density, distance
 
+    @pytest.mark.slow_after(1)
     def test_cloud_appears_where_it_is_painted(self, renderer, rng, drift, edge):
         map = empty((256, 256))
         map[..., 1] = 0.6
@@ -165,6 +166,7 @@ class TestInTheSky:
         assert (distance > self.RADIUS + 120).mean() > 0.3
         assert (density[distance < 0.5 * self.RADIUS - 120] > 0).mean() > 0.5
 
+    @pytest.mark.slow_after(1)
     def test_a_place_is_kept_clear(self, renderer, rng, drift, edge):
         map = empty((256, 256), 1.0)
         map[..., 1:] = 0.6, 0.0

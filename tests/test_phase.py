@@ -135,6 +135,7 @@ def test_fit_of_droplets(diameter, peak):
         np.testing.assert_allclose(got, 1 / (4 * np.pi), rtol=1e-6)
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("diameter", DIAMETERS)
 def test_mie(diameter):
     """Twice as many colours by another program. The rings of the largest droplets, half a degree
@@ -168,6 +169,7 @@ def test_bow_and_glory(diameter):
     assert (np.abs(ratio - 1) < 0.35).all()
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("model", ["nubis2015", "thesis2018", "vsu2022", "octaves", "path"])
 def test_droplets_in_every_model(model):
     """The published models take the function as it is; octaves lose a share of each lobe."""
@@ -228,6 +230,7 @@ def test_sampled_directions(phase, diameter):
         )
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("diameter", [5.0, 50.0])
 @pytest.mark.parametrize("phase", ["henyey_greenstein", "droplet", "mie"])
 def test_no_nan_at_the_ends(phase, diameter):
@@ -241,6 +244,7 @@ def test_no_nan_at_the_ends(phase, diameter):
                 assert np.isfinite(got).all() and (got > 0).all()
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("phase", ["henyey_greenstein", "droplet", "mie"])
 def test_paths_of_one_scattering(renderer, phase):
     """A path cut after its first scattering is single scattering, whatever the function: in a

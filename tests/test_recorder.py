@@ -48,6 +48,7 @@ def test_a_warm_picture_is_submitted_and_waited_for_once(quality, pictures):
     assert [c[:2] for c in counts[2:]] == [[1, 1]] * (len(counts) - 2), counts
 
 
+@pytest.mark.slow
 def test_a_long_still_is_submitted_as_seldom_as_may_be():
     """Two submissions, and one more for each eighth of a second of work at most: a fourth of a
     slice, as kernels may be thought to take longer than they did. On two quiet cores it is two.
@@ -99,6 +100,7 @@ PICTURES = {
 }
 
 
+@pytest.mark.slow_after(2)
 @pytest.mark.parametrize("picture", PICTURES)
 def test_an_interrupt_is_answered_soon(picture):
     """The one bound on a time among the tests: without it, nobody would notice that a picture can

@@ -63,6 +63,7 @@ def twin(rays, contrast, backdrop):
     return picture
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("contrast", [0.05, 0.3])
 def test_it_does_what_its_twin_does(contrast):
     """The spans in which later rays look for cloud cost a little more: 2 % of the pixels."""
@@ -78,6 +79,7 @@ def test_it_does_what_its_twin_does(contrast):
     assert np.abs(got - rays).max() > 10 * contrast * 1e-3
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("scene", ["fair_weather", "overcast", "storm", "above", "in_cloud"])
 def test_it_costs_little_error(scene):
     """Against a ray for every pixel: 9 % of the mean radiance, 0.03 of the transmittance, no bias
@@ -96,6 +98,7 @@ def test_it_costs_little_error(scene):
     assert (has_depth | (few["transmittance"] == 1)).all()
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize(
     "size", [(1, 1), (1, 7), (7, 1), (2, 2), (3, 5), (4, 4), (5, 4), (6, 9), (23, 18)]
 )
@@ -112,6 +115,7 @@ def test_sizes_that_four_does_not_divide(size):
     assert (few["radiance"] > 0).all(axis=-1).any()
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("size", [(160, 90), (97, 62), (162, 91)])
 def test_it_follows_from_the_picture_alone(size):
     """Whatever the renderer has made before, and so what its buffers hold."""
@@ -123,6 +127,7 @@ def test_it_follows_from_the_picture_alone(size):
         assert used.render(camera, params).tobytes() == fresh.tobytes()
 
 
+@pytest.mark.slow
 def test_sheets_meet(monkeypatch):
     """A picture of more than a million pixels is made in sheets, which share a row of rays."""
     size = 4096, 264  # 256 rows a sheet

@@ -53,6 +53,7 @@ VALUES["png"] = tuple(
 )
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("ending", [*ENDINGS, "toml"])
 def test_a_killed_writer_leaves_a_whole_file(tmp_path, ending):
     path = tmp_path / f"sky.{ending}"

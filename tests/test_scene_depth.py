@@ -43,6 +43,7 @@ def cut_twin(monkeypatch, depth, function, *args):
     return function(*args)
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("method", ["march", "reference"])
 def test_mountain_in_the_clouds(renderer, monkeypatch, method):
     """In front of, inside and behind cloud, against float64 rays that end at the same depth: single
@@ -68,6 +69,7 @@ def test_mountain_in_the_clouds(renderer, monkeypatch, method):
     assert twin.relative_rmse(layers["radiance"].reshape(-1, 3), light) < 0.01
 
 
+@pytest.mark.slow
 def test_path_tracing_ends_at_the_scene(monkeypatch):
     """Its transmittance is a share of 256 paths: within five standard errors everywhere."""
     params, depth = single(**{"light.model": "path"}), mountain()
@@ -83,6 +85,7 @@ def test_path_tracing_ends_at_the_scene(monkeypatch):
     assert (np.abs(layers["transmittance"] - seen) < 5 * error).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", ["fair_weather", "above"])
 @pytest.mark.parametrize("contrast", [0.0, 0.2])
 def test_nothing_there_changes_nothing(scene, contrast):
@@ -105,6 +108,7 @@ def test_nothing_there_changes_nothing(scene, contrast):
     assert np.array_equal(ours.render(camera, params), plain)
 
 
+@pytest.mark.slow
 def test_lattices_do_not_reach_across_the_scene():
     """With rays between rays of a lattice, edges of the scene are as if every ray were marched."""
     camera, params = nubis.scenes["fair_weather"]
@@ -256,6 +260,7 @@ def test_an_animation_of_a_scene_that_stands_still_becomes_the_still():
     assert twin.relative_rmse(ours.render(*CLOUDY), still) > 0.1
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("background", ["sky", None])
 def test_an_edge_that_moves_leaves_no_ghost(background):
     """Where the scene of the frame before was another, the picture is the still's, to the bit."""
@@ -297,6 +302,7 @@ def flight(i, size):
     return camera, params, i / 24, np.where(pillar, near, depth).astype(np.float32)
 
 
+@pytest.mark.slow
 def test_a_flight_past_a_scene_is_as_near_the_stills_as_without():
     """No farther from stills of the same shots than a flight without a scene, and not on the pixels
     beside its edges, which are marched: there only the jitter of later rounds differs.
@@ -321,6 +327,7 @@ def test_a_flight_past_a_scene_is_as_near_the_stills_as_without():
     assert max(errors) < 1.1 * max(plain)
 
 
+@pytest.mark.slow
 def test_animated_paths_end_at_the_scene():
     """A static shot goes on tracing; another scene is another shot."""
     params = CLOUDY[1].with_(**{"light.model": "path"})

@@ -152,6 +152,7 @@ def seen_ground(camera, params, time=0.0, **changes):
     return sky.reshape(-1, 3).astype(np.float64)
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("eye, time", [((0, 0, 6000), 0.0), ((290, -290, 3000), 2.4)])
 def test_shadows_on_the_ground_of_pictures(renderer, eye, time):
     """Direct sun times transmittance, against `sun_transmittance` where each pixel's ray meets the
@@ -233,6 +234,7 @@ def test_shadows_of_a_grid():
         assert ratio[under].max() < 0.5 and ratio[beside].min() > 0.999
 
 
+@pytest.mark.slow
 def test_switched_off_nothing_is_kept_from_the_ground():
     """Then clouds change nothing of what is behind them; nor do shadows without clouds."""
     params = nubis.scenes["fair_weather"][1]
@@ -244,6 +246,7 @@ def test_switched_off_nothing_is_kept_from_the_ground():
     assert not np.array_equal(seen_ground(DOWN, params), plain)
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("altitude", [2.0, 200.0, 2e4, 4e5, 2e7])
 def test_ground_from_everywhere(altitude):
     """From the ground to space: finite, and never brighter than without shadows."""
@@ -256,6 +259,7 @@ def test_ground_from_everywhere(altitude):
     assert (shadowed <= plain).all() and (shadowed < 0.99 * plain).any()
 
 
+@pytest.mark.slow
 def test_what_sees_no_ground_bakes_nothing():
     """Nor does night, nor a picture of the clouds alone, where the air is not shaded; and one that
     has been baked stays.

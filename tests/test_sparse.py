@@ -46,6 +46,7 @@ def wider(camera, size, rim):
     return camera, [n + 2 * rim for n in size]
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("size", [(240, 136), (241, 135), (163, 110), (242, 139), (1024, 1100)])
 def test_a_still_lies_between_its_rays(size):
     """Up to those beyond its edges, and across the sheets that a large one is made in."""
@@ -62,6 +63,7 @@ def test_a_still_lies_between_its_rays(size):
     assert (np.abs(got - expected) > 1e-3).mean() < 0.02
 
 
+@pytest.mark.slow
 def test_what_is_between_is_put_where_it_belongs():
     """With air, sky, high clouds and shadows: near the picture that has a ray for each pixel."""
     camera, params, _ = next(shots(1))
@@ -110,6 +112,7 @@ def test_depth_is_that_of_the_opaque():
     assert np.isinf(found[weight == 0]).all()
 
 
+@pytest.mark.slow
 def test_a_static_shot_is_the_still():
     camera, params, _ = next(shots(1))
     make = nubis.Renderer(*SIZE, quality=PREVIEW)
@@ -143,6 +146,7 @@ def test_clouds_go_where_they_are_seen_next():
     assert twin.relative_rmse(last[known], still[known]) < 0.08  # 0.050; by whole pixels, 0.15
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("scene", ["fair_weather", "above", "overcast"])
 def test_a_flight_is_near_its_stills(scene):
     """Within 5 %, where frames that follow every pixel differ by 10 %."""
@@ -190,6 +194,7 @@ def test_history():
         assert set(np.unique(length)) <= {4 * n for n in range(1, count + 1)} | {16}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["fisheye", "equirect"])
 def test_other_projections(kind):
     """A flight in them is as near to its stills, their edges and rim no farther than the rest."""
@@ -210,6 +215,7 @@ def test_other_projections(kind):
     assert twin.relative_rmse(last, still) < 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [(1, 1), (2, 7), (5, 6), (3, 200), (200, 3), (8, 8)])
 def test_small_and_narrow_pictures(size):
     """Of fewer pixels than a cell has, too: in frames as in stills."""
@@ -226,6 +232,7 @@ def test_small_and_narrow_pictures(size):
     assert twin.relative_rmse(frames[-1], make.render(*other[:2])) < 0.1
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("altitude", [9000.0, 40_000.0])
 def test_from_above_the_high_clouds(altitude):
     """Each pixel is composed by itself there, before and behind the layer that is seen twice."""

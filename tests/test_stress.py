@@ -1,7 +1,7 @@
 """The renderer at and beyond the ends of everything: properties of thousands of skies.
 
-A few hundred always run, the same every time. `make stress` runs many more: EXAMPLES of them, other
-ones for each SEED.
+A few always run and some hundreds in the second tier, the same every time. `make stress` runs many
+more: EXAMPLES of them, other ones for each SEED.
 """
 
 import functools
@@ -22,6 +22,7 @@ from strategies import DRAFT
 from test_params import CLASSES, IMAGES, allowed, filled, kind
 
 EXAMPLES = int(os.environ.get("EXAMPLES", 700))
+FEW = 5  # of them in the first tier: most of what one takes is to compile another kernel
 SEED = os.environ.get("SEED")
 RAN = {}  # examples by property, for the summary (conftest.py)
 
@@ -35,18 +36,27 @@ def stress(share, *arguments):
             test(**values)
             RAN[test.__name__] = RAN.get(test.__name__, 0) + 1
 
-        chosen = settings(
-            max_examples=max(math.ceil(share * EXAMPLES), 1),
-            derandomize=SEED is None,
-            database=None,
-            deadline=None,
-            print_blob=False,
-            suppress_health_check=list(HealthCheck),
-            # Without explaining failures, which traces every line.
-            phases=[Phase.explicit, Phase.generate, Phase.target, Phase.shrink],
-        )
-        made = chosen(given(*arguments)(counted))
-        return seed(int(SEED))(made) if SEED else made
+        def of(examples):
+            chosen = settings(
+                max_examples=max(math.ceil(share * examples), 1),
+                derandomize=SEED is None,
+                database=None,
+                deadline=None,
+                print_blob=False,
+                suppress_health_check=list(HealthCheck),
+                # Without explaining failures, which traces every line.
+                phases=[Phase.explicit, Phase.generate, Phase.target, Phase.shrink],
+            )
+            made = chosen(given(*arguments)(counted))
+            return seed(int(SEED))(made) if SEED else made
+
+        @pytest.mark.slow_after(1)
+        @pytest.mark.parametrize("examples", [of(FEW), of(EXAMPLES)], ids=["few", "many"])
+        def both(examples):
+            examples()
+
+        both.__name__, both.__doc__ = test.__name__, test.__doc__
+        return both
 
     return decorate
 

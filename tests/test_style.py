@@ -1,5 +1,5 @@
-"""Style that no formatter holds up: the layout of WGSL files, constants that are copied, and the
-version of Rust.
+"""Style that no formatter holds up: the layout of WGSL files, constants that are copied, the version
+of Rust, tiers of tests.
 
 `UPDATE=1 pytest tests/test_style.py` lowers the numbers of wide_lines.json to what is there.
 """
@@ -7,6 +7,8 @@ version of Rust.
 import json
 import os
 import re
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
@@ -121,3 +123,11 @@ def test_one_version_of_rust():
     pinned = tomllib.loads((ROOT / "rust-toolchain.toml").read_text())
     oldest = cargo["workspace"]["package"]["rust-version"]
     assert re.fullmatch(re.escape(oldest) + r"\.\d+", pinned["toolchain"]["channel"])
+
+
+@pytest.mark.slow
+def test_the_first_tier_has_a_test_of_each_file():
+    command = [sys.executable, "-m", "pytest", "--collect-only", "-q", "-m", "not slow"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300)
+    guarded = {line.split("::")[0] for line in done.stdout.splitlines() if "::" in line}
+    assert guarded == {f"tests/{path.name}" for path in Path(__file__).parent.glob("test_*.py")}

@@ -61,6 +61,7 @@ def test_more_evaluations_than_a_dispatch_may_make(renderer):
     assert np.sqrt(np.mean(error**2)) < 1e-3 * usual["radiance"].mean()
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("model", ["nubis2015", "thesis2018", "vsu2022", "octaves"])
 def test_methods_converge_to_the_reference(renderer, model):
     """Every light model: many equal steps and light samples come to the same picture."""
@@ -75,6 +76,7 @@ def test_methods_converge_to_the_reference(renderer, model):
     assert (want["change"] <= 1.1e-3 * (want["radiance"] + 1e-6 * 3)).mean() > 0.9
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize(("scene", "clear"), [("fair_weather", 0.1), ("storm", 0.005)])
 def test_majorants_are_never_exceeded(rng, scene, clear):
     """Not at the point, and nowhere within their reach."""
@@ -132,6 +134,7 @@ def test_majorants_of_a_grid(rng):
     assert (ask(f"vec4f({near}.density)", points[:100]) >= 1).all()
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("g", [0.6, -0.4])
 def test_paths_of_one_scattering(renderer, g):
     """They are the reference's single scattering, by Z-score of the tiles' means."""

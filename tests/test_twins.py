@@ -53,6 +53,7 @@ def test_cells_wrap(rng, period):
     np.testing.assert_array_equal(got, np.mod(cells, period))
 
 
+@pytest.mark.slow_after(3)
 @pytest.mark.parametrize("salt", [0, 977, 2**32 - 2])
 @pytest.mark.parametrize("period", [1, 2, 3, 48])
 def test_noises_at_points(rng, period, salt):
@@ -78,6 +79,7 @@ def test_noises_at_points(rng, period, salt):
     assert (error < 2.0**-23 * period * slopes + 1e-6).all(), error
 
 
+@pytest.mark.slow_after(3)
 @pytest.mark.parametrize("salt", [0, 977, 2**32 - 2])
 @pytest.mark.parametrize("period", [1, 2, 3, 7, 48])
 def test_simplex_noise(rng, period, salt):
@@ -134,6 +136,7 @@ def noise_params(request):
     return nubis.Params().with_(**{"clouds.noise": request.param, "clouds.seed": SEED})
 
 
+@pytest.mark.slow_after(1)
 def test_base_shape(rng, noise_params):
     at = rng.integers(0, noise_twin.SHAPE_SIZE, (3000, 3))
     expected = noise_twin.bakes(noise_params)["shape_noise"](at)
@@ -143,6 +146,7 @@ def test_base_shape(rng, noise_params):
     assert expected.std() > 0.1
 
 
+@pytest.mark.slow_after(2)
 @pytest.mark.parametrize("level", [0, 2])
 @pytest.mark.parametrize("share", [0.0, 0.6, 1.0])
 def test_detail(rng, noise_params, share, level):
@@ -165,6 +169,7 @@ def test_curl_noise(rng, noise_params):
     np.testing.assert_allclose(got, expected, atol=2 * STEP)
 
 
+@pytest.mark.slow_after(2)
 @pytest.mark.parametrize(
     "weather",
     [
@@ -195,6 +200,7 @@ def test_weather_map(rng, weather):
     np.testing.assert_allclose(got, expected, atol=STEP + 1e-5)
 
 
+@pytest.mark.slow_after(2)
 @pytest.mark.parametrize(
     ("time", "high"),
     [
@@ -328,6 +334,7 @@ def added(rng, kind):
     }[kind]
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize(
     ("seed", "time", "kind", "edge"),
     [

@@ -86,6 +86,7 @@ def test_only_a_grid_is_a_volume():
             nubis.Params.from_dict({"volume": bad})
 
 
+@pytest.mark.slow_after(2)
 @pytest.mark.parametrize("model", ["single", "nubis2015", "thesis2018", "vsu2022", "octaves"])
 @pytest.mark.parametrize("quality", ["draft", "balanced", "high", "nubis2015", "vsu2022"])
 def test_every_method_renders_it(renderer, quality, model):
@@ -125,6 +126,7 @@ HIGH = {
 UP = nubis.Camera.look_at((0, 0, 100), (0, 1000, 900))
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("quality", ["draft", "reference"])
 @pytest.mark.parametrize("model", ["nubis2015", "path"])
 def test_a_grid_is_all_the_cloud_there_is(renderer, quality, model):

@@ -44,6 +44,7 @@ class TestNoises:
                 difference = np.abs(a - b)[..., channel].mean()
                 assert difference > 0.8 * a[..., channel].std()
 
+    @pytest.mark.slow
     def test_more_coverage_is_more_cloud(self, renderer, noise):
         """At every point of the field, and in the picture, from a clear sky to an overcast one."""
         sky = nubis.scenes["fair_weather"][1].with_(
@@ -159,6 +160,7 @@ def test_a_clamped_map_far_away(renderer, rng):
     assert np.isfinite(renderer().density(points, sky, time=1.7e308)).all()
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("edge", EDGES)
 @pytest.mark.parametrize("size", [(128, 96), (100, 37)])
 def test_majorants_beyond_the_edge(rng, edge, size):
@@ -195,6 +197,7 @@ def test_majorants_beyond_the_edge(rng, edge, size):
     assert (ask(f"vec4f({reach_of}.density)", west)[:, 0] > 0).any() == (edge == "repeat")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("edge", EDGES)
 def test_paths_beyond_the_edge(renderer, edge):
     """Paths of one scattering and the reference see the same clouds past the edge of a map."""
@@ -408,6 +411,7 @@ class TestMixtures:
         ]:
             np.testing.assert_array_equal(renderer().density(points, params), want[same])
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("method", ["path", "shadows"])
     def test_what_is_baked_from_the_map_follows(self, method):
         """Majorants, and shadows on ground and air: as on a renderer that has seen no other
@@ -577,6 +581,7 @@ class TestWeatherBlend:
         with pytest.raises(ParameterError, match=re.escape(words)):
             make(self.A)
 
+    @pytest.mark.slow
     def test_no_frame_jumps(self, renderer):
         """Map and picture change from frame to frame by no more than a change's pace, also where
         one interrupts another; without the blend they jump.
@@ -618,6 +623,7 @@ class TestBakes:
         renderer.render(nubis.Camera.equirect((0, 0, 2)), params)
         return {"weather", "weather_mix"} & set(renderer.timings)
 
+    @pytest.mark.slow
     def test_a_map_is_baked_when_its_own_inputs_change(self):
         renderer = nubis.Renderer(8, 4, quality="draft")
         sky = Params(weather=Weather(seed=self.SEED))

@@ -229,6 +229,7 @@ def test_the_detail_drifts_its_own_way(renderer, rng):
     assert rms(east - north) > 0.05 * east.std()
 
 
+@pytest.mark.slow
 def test_cover_wanders_in_the_picture(renderer):
     """The picture at a time is that of the cover that the twin has for it, and no cover leaves
     0 to 1: at the ends of the range it is that of a clear and of an overcast sky.
@@ -284,6 +285,7 @@ def test_what_does_not_wander_stays(renderer):
         assert len({picture(**{name: 0.3}, seed=seed) for seed in (1, 2, 3)} | {picture()}) == 4
 
 
+@pytest.mark.slow
 def test_an_animation_of_a_wandering_wind_stays_near_the_still(renderer):
     """The reprojection follows the wind as it wanders. In a lull, where a gale of 100 m/s all but
     stands still, the error is 0.22, which is what this size has of neighbours four pixels apart;
@@ -307,6 +309,7 @@ def test_an_animation_of_a_wandering_wind_stays_near_the_still(renderer):
     assert twin.relative_rmse(last[..., :3], still[..., :3]) < 0.3
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("wander", [{}, {"wander.wind": 1.0}], ids=["steady", "wandering"])
 def test_shadows_drift_with_the_wind(wander):
     """Those on the ground are baked every 600 m of the eye's way and every 32 m of the fastest that

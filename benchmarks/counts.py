@@ -71,11 +71,12 @@ def counting_shaders(folder: Path) -> None:
     for line in path.read_text().splitlines():
         indent = line[: len(line) - len(line.lstrip())]
         if line.strip() == "evaluations += 1u;":
-            line = f"{indent}evaluations += u32(quality.path_samples <= {_EVALUATIONS}u);"
+            line = f"{indent}evaluations += u32(params.quality.path_samples <= {_EVALUATIONS}u);"
         for texture in re.findall(r"textureSampleLevel\((\w+)", line):
             found.append(texture)
             chosen = _EVALUATIONS + found.index(texture) + 1
-            counts = f"quality.path_samples == {chosen}u || quality.path_samples == {_ALL + 1}u"
+            asked = "params.quality.path_samples"
+            counts = f"{asked} == {chosen}u || {asked} == {_ALL + 1}u"
             lines.append(f"{indent}evaluations += u32({counts});")
         lines.append(line)
     path.write_text("\n".join(lines) + "\n")

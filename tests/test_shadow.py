@@ -69,7 +69,9 @@ def test_depth_is_the_sum_of_its_samples(renderer, rng):
     way = f"vec4f({stretches}.start, {stretches}.first, {stretches}.second, {step})"
     start, first, second, fine = probe(way, points, **ask).astype(float).T
     assert (second == 0).all()
-    sun = probe("vec4f(frame.sky.sun_direction, frame.sky.extinction)", [0.0], **ask)[0].astype(float)
+    sun = probe("vec4f(frame.sky.sun_direction, frame.sky.extinction)", [0.0], **ask)[0].astype(
+        float
+    )
     counts = np.ceil(first / fine).astype(int)
     assert len(set(counts)) > 1
     owner = np.repeat(np.arange(len(points)), counts)

@@ -113,7 +113,7 @@ def test_where_each_tile_stands(time, wander):
     }
     for name, (metres, tile) in expected.items():
         n = len(metres)
-        wgsl = f"vec4f(frame.{name}, {', '.join(['0.0'] * (4 - n))})"
+        wgsl = f"vec4f(frame.sky.{name}, {', '.join(['0.0'] * (4 - n))})"
         got = probe(wgsl, [0.0], imports=["bindings"], params=params, time=time)[0, :n]
         apart = np.mod(got + metres / noise_twin.f32(tile) + 0.5, 1) - 0.5
         # Rounding to f32, and what the twin's own sums and sines lose of the way.

@@ -1,5 +1,5 @@
-"""Style that no formatter holds up: the layout of WGSL files, constants that are copied, the version
-of Rust, tiers of tests.
+"""Style that no formatter holds up: the layout of WGSL files, constants that are copied, the
+version of Rust, tiers of tests.
 
 `UPDATE=1 pytest tests/test_style.py` lowers the numbers of wide_lines.json to what is there.
 """

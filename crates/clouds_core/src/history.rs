@@ -2,9 +2,13 @@
 
 use crate::camera::Camera;
 use crate::frame::Frame;
+use crate::gpu::Gpu;
+use crate::grid;
 use crate::params::{self, Params};
-use crate::scene_depth::SceneDepth;
+use crate::scene_depth::{SceneDepth, SceneTextures};
 use crate::shot::Shot;
+use crate::targets::TemporalTargets;
+use crate::wind::Carried;
 
 /// The frame before.
 pub(crate) struct Past {
@@ -101,5 +105,55 @@ impl Accumulator {
             self.image.iter_mut().zip(&still).for_each(|(old, new)| *old += share * (new - *old));
         }
         self.count += 1;
+    }
+}
+
+impl Frame {
+    /// Notes what has changed since the frame before.
+    pub(crate) fn follow(
+        &mut self,
+        shot: &Shot<'_>,
+        params: &Params,
+        last: Option<&Past>,
+        resized: Option<&TemporalTargets>,
+    ) {
+        let Some(last) = last else { return };
+        let carried = Carried::between((&last.params, last.time), (params, shot.time));
+        self.set_previous(&last.frame, shot.camera.eye - last.camera.eye, &carried);
+        let scene = shot.scene.map(|scene| scene.distance);
+        let still = last.camera == *shot.camera && self.view.cloud_motion == [0.0; 3] && last.scene.as_deref() == scene;
+        self.view.moving = u32::from(!still);
+        if let Some(old) = resized {
+            [self.view.previous_width, self.view.previous_height] = old.size;
+            self.view.previous_spacing = grid::spacing(old.sparse);
+            self.view.previous_round = grid::round(old.sparse);
+        }
+    }
+}
+
+/// Uploads the user's scene of a frame and that of the frame before. Where one was and is no more, or is and was not, there is
+/// nothing.
+pub(crate) fn upload_scenes(
+    kept: &mut Option<SceneTextures>,
+    targets: &mut TemporalTargets,
+    gpu: &Gpu,
+    scene: Option<SceneDepth<'_>>,
+    last: Option<&Past>,
+    frame: &Frame,
+) {
+    if !frame.scene {
+        return;
+    }
+    let pixels = frame.view.width * frame.view.height;
+    let nothing = vec![f32::INFINITY; pixels as usize];
+    let now = scene.unwrap_or(SceneDepth { distance: &nothing, color: None });
+    let before = last.and_then(|last| last.scene.as_deref()).unwrap_or(&nothing);
+    if !targets.scene_before.holds(pixels.into(), false) {
+        targets.scene_before = SceneTextures::new(gpu, pixels.into(), false);
+    }
+    let whole = 0..pixels as usize;
+    targets.scene_before.upload(gpu, &SceneDepth { distance: before, color: None }, whole.clone());
+    if let Some(textures) = SceneTextures::fit(kept, gpu, Some(now), pixels) {
+        textures.upload(gpu, &now, whole);
     }
 }

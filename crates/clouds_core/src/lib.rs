@@ -21,6 +21,7 @@ mod mie;
 mod moon;
 pub mod params;
 mod passes;
+pub mod picture;
 mod plan;
 mod query;
 pub mod renderer;

@@ -11,7 +11,8 @@ use crate::frame::Frame;
 use crate::gpu::Interrupt;
 use crate::params::{Moon, Params, Sun};
 use crate::passes::display::Screen;
-use crate::renderer::{Picture, Renderer};
+use crate::picture::Picture;
+use crate::renderer::Renderer;
 use crate::scene_depth::SceneDepth;
 use crate::shot::Shot;
 

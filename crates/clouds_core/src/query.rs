@@ -14,7 +14,7 @@ use crate::gpu::{Recorder, Which};
 use crate::luts::{Inputs, shadow};
 use crate::params::Params;
 use crate::passes::points;
-use crate::renderer::{Renderer, held};
+use crate::renderer::Renderer;
 use crate::shot::Shot;
 use crate::specialization;
 
@@ -191,7 +191,7 @@ impl Renderer {
         let (quality, eye, time) = (&self.quality, shot.camera.eye, shot.time);
         let inputs = Inputs { params: &params, quality, frame: &frame, eye, time, specialization };
         self.luts.update(&mut rec, &inputs)?;
-        self.lut_memory = held(&rec);
+        self.lut_memory = rec.held();
         Ok((rec, frame))
     }
 }

@@ -6,21 +6,21 @@ use std::thread;
 
 use crate::blue_noise;
 use crate::error::{Error, Result};
-use crate::frame::Frame;
 use crate::gpu::Recorder;
-use crate::gpu::{Download, Gpu, Interrupt, Timings, check_fork};
-use crate::grid::{self, TILE};
-use crate::history::{Accumulator, Past};
+use crate::gpu::{Gpu, Interrupt, Timings, check_fork};
+use crate::grid::{self};
+use crate::history::{Accumulator, Past, upload_scenes};
 use crate::luts::Luts;
-use crate::params::{Model, Params, Quality};
+use crate::params::{Model, Quality};
 use crate::passes::composite::Parts;
 use crate::passes::display::{self, Screen};
 use crate::passes::{composite, march, path, reference, reproject};
+use crate::picture::{Picture, download};
 use crate::plan::{Integrator, Plan};
-use crate::scene_depth::{SceneDepth, SceneTextures};
+use crate::scene_depth::SceneTextures;
 use crate::shot::{Shot, check_size};
-use crate::targets::{StillTargets, TemporalTargets, count};
-use crate::wind::{Carried, Going};
+use crate::targets::{StillTargets, TemporalTargets, count, fit_temporal};
+use crate::wind::Going;
 
 /// What [`Renderer::history_length`] says of a pixel that has had a ray of its own: frames in which every pixel is marched once.
 pub const ROUND: u32 = grid::round(false);
@@ -43,22 +43,6 @@ pub struct Renderer {
     pub(crate) lut_memory: Vec<(&'static str, u64)>,
     /// Milliseconds on the GPU by kernel, for the last picture or answer.
     pub timings: Timings,
-}
-
-/// A picture, row by row.
-#[derive(Clone, Debug, Default)]
-pub struct Picture {
-    /// Four numbers a pixel: radiance and alpha (see [`Renderer::render`]).
-    pub image: Vec<f32>,
-    /// Four numbers a pixel: radiance of the sky without clouds, and 1.
-    pub sky: Vec<f32>,
-    /// Metres to the mean scattering point, -1 where there is none.
-    pub depth: Vec<f32>,
-    /// Density evaluations, primary and light together.
-    pub samples: Vec<u32>,
-    /// Four numbers a pixel: how sure the radiance of the clouds is, and 0. A standard error where paths are traced, the
-    /// change by the last halving where rays converge, nothing where they are marched.
-    pub uncertainty: Vec<f32>,
 }
 
 impl Renderer {
@@ -147,9 +131,10 @@ impl Renderer {
         let mut rec = Recorder::new(&self.gpu, &mut self.timings, interrupt);
         let inputs = plan.inputs(shot, &params, &self.quality, &frame);
         self.luts.update(&mut rec, &inputs)?;
-        let scene = fit_scene(&mut self.scene_depth, &self.gpu, shot.scene, frame.view.width * plan.most_rows());
+        let scene =
+            SceneTextures::fit(&mut self.scene_depth, &self.gpu, shot.scene, frame.view.width * plan.most_rows());
         rec.bind(scene.map_or(Vec::new(), SceneTextures::bindings));
-        self.lut_memory = held(&rec);
+        self.lut_memory = rec.held();
 
         let mut picture = Picture::default();
         for strip in &plan.strips {
@@ -217,7 +202,7 @@ impl Renderer {
         let inputs = plan.inputs(shot, &params, &self.quality, &frame);
         self.luts.update(&mut rec, &inputs)?;
         rec.bind(self.scene_depth.as_ref().map_or(Vec::new(), SceneTextures::bindings));
-        self.lut_memory = held(&rec);
+        self.lut_memory = rec.held();
 
         let TemporalTargets { refined, current, before, now, composed, backdrop, scene_before, .. } = &*targets;
         if let Some(old) = &resized {
@@ -308,125 +293,5 @@ impl Renderer {
         self.accumulator = None;
         self.going = Going::default();
         self.last = None;
-    }
-}
-
-/// Textures for a user's scene of so many pixels, none where there is none.
-fn fit_scene<'a>(
-    kept: &'a mut Option<SceneTextures>,
-    gpu: &Gpu,
-    scene: Option<SceneDepth<'_>>,
-    pixels: u32,
-) -> Option<&'a SceneTextures> {
-    let colored = scene?.color.is_some();
-    if !kept.as_ref().is_some_and(|old| old.holds(pixels.into(), colored)) {
-        *kept = Some(SceneTextures::new(gpu, pixels.into(), colored));
-    }
-    kept.as_ref()
-}
-
-/// Buffers for a frame, and those of the frame before where it had another size or was known at other pixels.
-fn fit_temporal<'a>(
-    kept: &'a mut Option<TemporalTargets>,
-    gpu: &Gpu,
-    frame: &Frame,
-) -> (&'a mut TemporalTargets, Option<TemporalTargets>) {
-    let (size, sparse) = ([frame.view.width, frame.view.height], frame.sparse);
-    let old = kept.take_if(|old| (old.size, old.sparse) != (size, sparse));
-    (kept.get_or_insert_with(|| TemporalTargets::new(gpu, size, sparse)), old)
-}
-
-/// Uploads the user's scene of a frame and that of the frame before. Where one was and is no more, or is and was not, there is
-/// nothing.
-fn upload_scenes(
-    kept: &mut Option<SceneTextures>,
-    targets: &mut TemporalTargets,
-    gpu: &Gpu,
-    scene: Option<SceneDepth<'_>>,
-    last: Option<&Past>,
-    frame: &Frame,
-) {
-    if !frame.scene {
-        return;
-    }
-    let pixels = frame.view.width * frame.view.height;
-    let nothing = vec![f32::INFINITY; pixels as usize];
-    let now = scene.unwrap_or(SceneDepth { distance: &nothing, color: None });
-    let before = last.and_then(|last| last.scene.as_deref()).unwrap_or(&nothing);
-    if !targets.scene_before.holds(pixels.into(), false) {
-        targets.scene_before = SceneTextures::new(gpu, pixels.into(), false);
-    }
-    let whole = 0..pixels as usize;
-    targets.scene_before.upload(gpu, &SceneDepth { distance: before, color: None }, whole.clone());
-    if let Some(textures) = fit_scene(kept, gpu, Some(now), pixels) {
-        textures.upload(gpu, &now, whole);
-    }
-}
-
-/// Names and bytes of what a recording has bound so far.
-pub(crate) fn held(rec: &Recorder<'_>) -> Vec<(&'static str, u64)> {
-    rec.scope().iter().map(|(name, binding)| (*name, binding.bytes())).filter(|(_, bytes)| *bytes > 0).collect()
-}
-
-/// Brings a strip of a still back.
-fn download(rec: &mut Recorder<'_>, frame: &Frame, targets: &StillTargets, layers: bool) {
-    let StillTargets { marched, composed, rays, .. } = targets;
-    let pixels = count([frame.view.width, frame.dispatch.rows]);
-    rec.download(&composed.image, 0, 16 * pixels);
-    if layers {
-        rec.download(&composed.sky, 0, 16 * pixels);
-        rec.download(&composed.depth, 0, 4 * pixels);
-        let known = grid::known([frame.view.width, frame.dispatch.rows], frame.sparse);
-        rec.download(&marched.samples, 0, 4 * count(known));
-        if let Some(rays) = rays {
-            rec.download(&rays.uncertainty, 0, 16 * pixels);
-        }
-    }
-}
-
-impl Picture {
-    /// Adds a strip.
-    fn append(&mut self, downloads: &[Download], frame: &Frame, layers: bool) {
-        self.image.extend_from_slice(downloads[0].numbers());
-        if !layers {
-            return;
-        }
-        self.sky.extend_from_slice(downloads[1].numbers());
-        self.depth.extend_from_slice(downloads[2].numbers());
-        let samples: &[u32] = downloads[3].numbers();
-        if frame.sparse {
-            let [columns, _] = grid::known([frame.view.width, frame.dispatch.rows], true);
-            self.samples.extend(at_known(samples, columns, [frame.view.width, frame.dispatch.rows]));
-        } else {
-            self.samples.extend_from_slice(samples);
-        }
-        if let Some(uncertainty) = downloads.get(4) {
-            self.uncertainty.extend_from_slice(uncertainty.numbers());
-        }
-    }
-}
-
-/// A number for each pixel of a part of a sparse picture: where it is known, one of `numbers`, which has so many columns, and
-/// none between.
-fn at_known(numbers: &[u32], columns: u32, [width, height]: [u32; 2]) -> impl Iterator<Item = u32> {
-    let place = move |x: u32, y: u32| (y / TILE * columns + x / TILE) as usize;
-    let known = |x: u32, y: u32| x.is_multiple_of(TILE) && y.is_multiple_of(TILE);
-    (0..height).flat_map(move |y| (0..width).map(move |x| if known(x, y) { numbers[place(x, y)] } else { 0 }))
-}
-
-impl Frame {
-    /// Notes what has changed since the frame before.
-    fn follow(&mut self, shot: &Shot<'_>, params: &Params, last: Option<&Past>, resized: Option<&TemporalTargets>) {
-        let Some(last) = last else { return };
-        let carried = Carried::between((&last.params, last.time), (params, shot.time));
-        self.set_previous(&last.frame, shot.camera.eye - last.camera.eye, &carried);
-        let scene = shot.scene.map(|scene| scene.distance);
-        let still = last.camera == *shot.camera && self.view.cloud_motion == [0.0; 3] && last.scene.as_deref() == scene;
-        self.view.moving = u32::from(!still);
-        if let Some(old) = resized {
-            [self.view.previous_width, self.view.previous_height] = old.size;
-            self.view.previous_spacing = grid::spacing(old.sparse);
-            self.view.previous_round = grid::round(old.sparse);
-        }
     }
 }

@@ -50,6 +50,20 @@ pub(crate) struct SceneTextures {
 }
 
 impl SceneTextures {
+    /// Textures for a user's scene of so many pixels, none where there is none.
+    pub fn fit<'a>(
+        kept: &'a mut Option<Self>,
+        gpu: &Gpu,
+        scene: Option<SceneDepth<'_>>,
+        pixels: u32,
+    ) -> Option<&'a Self> {
+        let colored = scene?.color.is_some();
+        if !kept.as_ref().is_some_and(|old| old.holds(pixels.into(), colored)) {
+            *kept = Some(Self::new(gpu, pixels.into(), colored));
+        }
+        kept.as_ref()
+    }
+
     /// Most pixels of a sheet: textures have at least so many rows.
     pub const MOST_PIXELS: u64 = 8192 * SCENE_ROW as u64;
 

@@ -106,6 +106,17 @@ impl TemporalTargets {
     }
 }
 
+/// Buffers for a frame, and those of the frame before where it had another size or was known at other pixels.
+pub(crate) fn fit_temporal<'a>(
+    kept: &'a mut Option<TemporalTargets>,
+    gpu: &Gpu,
+    frame: &Frame,
+) -> (&'a mut TemporalTargets, Option<TemporalTargets>) {
+    let (size, sparse) = ([frame.view.width, frame.view.height], frame.sparse);
+    let old = kept.take_if(|old| (old.size, old.sparse) != (size, sparse));
+    (kept.get_or_insert_with(|| TemporalTargets::new(gpu, size, sparse)), old)
+}
+
 pub(crate) fn count(size: [u32; 2]) -> u64 {
     size.map(u64::from).iter().product()
 }

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use clouds_core::color::Metering;
 use clouds_core::gpu::Timings;
 use clouds_core::params::Weather;
-use clouds_core::renderer::Picture;
+use clouds_core::picture::Picture;
 use clouds_core::schema::Map;
 use clouds_core::{Camera, Error, Gpu, Params, Quality, Renderer, Result, Screen, Shot, color, files};
 

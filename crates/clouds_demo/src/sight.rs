@@ -1,7 +1,8 @@
 //! What of a picture is shown: itself, or what lies behind it.
 
 use clouds_core::color::LUMINANCE;
-use clouds_core::renderer::{Picture, ROUND};
+use clouds_core::picture::Picture;
+use clouds_core::renderer::ROUND;
 
 /// Evaluations that are white, as in thesis2018's figure 39.
 pub const WHITE: f32 = 500.0;

@@ -72,6 +72,21 @@ fn start_waiting(device: wgpu::Device) -> mpsc::Sender<Waiting> {
     sender
 }
 
+/// What is asked of a device.
+fn limits(adapter: &wgpu::Adapter) -> wgpu::Limits {
+    let offered = adapter.limits();
+    // What the code needs and no more, but as long a buffer as there is: it bounds the size of `animate`'s frames.
+    // `march` names 17 textures; Vulkan promises 16, drivers have 96 and more. `reproject` names 10 buffers; Vulkan promises
+    // 4, drivers of desktops have 16 and more.
+    wgpu::Limits {
+        max_sampled_textures_per_shader_stage: 17,
+        max_storage_buffers_per_shader_stage: 10,
+        max_buffer_size: offered.max_buffer_size,
+        max_storage_buffer_binding_size: offered.max_storage_buffer_binding_size,
+        ..wgpu::Limits::default()
+    }
+}
+
 /// A texel of nothing.
 fn nothing(device: &wgpu::Device, dimension: wgpu::TextureDimension) -> wgpu::TextureView {
     let texture = device.create_texture(&wgpu::TextureDescriptor {
@@ -118,17 +133,6 @@ impl Gpu {
     }
 
     fn new(adapter: &wgpu::Adapter, info: AdapterInfo, generated: Generated) -> Result<Self> {
-        let offered = adapter.limits();
-        // What the code needs and no more, but as long a buffer as there is: it bounds the size of `animate`'s frames.
-        // `march` names 17 textures; Vulkan promises 16, drivers have 96 and more. `reproject` names 10 buffers; Vulkan promises
-        // 4, drivers of desktops have 16 and more.
-        let limits = wgpu::Limits {
-            max_sampled_textures_per_shader_stage: 17,
-            max_storage_buffers_per_shader_stage: 10,
-            max_buffer_size: offered.max_buffer_size,
-            max_storage_buffer_binding_size: offered.max_storage_buffer_binding_size,
-            ..wgpu::Limits::default()
-        };
         let timestamps = wgpu::Features::TIMESTAMP_QUERY & adapter.features();
         let keeps = wgpu::Features::PIPELINE_CACHE & adapter.features();
         // Where a processor renders, its memory is ours, and what it has made is read in place: of a frame of 1920x1080, which takes
@@ -137,7 +141,7 @@ impl Gpu {
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("nubis"),
             required_features: timestamps | keeps | in_place,
-            required_limits: limits,
+            required_limits: limits(adapter),
             ..Default::default()
         };
         let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
@@ -184,7 +188,7 @@ impl Gpu {
             repeat_sampler: sampler("repeat_sampler", wgpu::AddressMode::Repeat),
             clamp_sampler: sampler("clamp_sampler", wgpu::AddressMode::ClampToEdge),
             mirror_sampler: sampler("mirror_sampler", wgpu::AddressMode::MirrorRepeat),
-            max_buffer: offered.max_storage_buffer_binding_size.min(offered.max_buffer_size),
+            max_buffer: adapter.limits().max_storage_buffer_binding_size.min(adapter.limits().max_buffer_size),
             nothing: [wgpu::TextureDimension::D2, wgpu::TextureDimension::D3]
                 .map(|dimension| nothing(&device, dimension)),
             shared: Mutex::default(),

@@ -137,9 +137,9 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// What every dispatch may use.
-    pub fn scope(&self) -> &Bindings {
-        &self.scope
+    /// Names and bytes of what every dispatch may use.
+    pub fn held(&self) -> Vec<(&'static str, u64)> {
+        self.scope.iter().map(|(name, binding)| (*name, binding.bytes())).filter(|(_, bytes)| *bytes > 0).collect()
     }
 
     /// Compiles kernels from here on for the values of a table; returns that before.

@@ -95,6 +95,7 @@ test: types window ## Run the tests of the first tier (8 min on two cores); need
 	$(PYTEST) -m 'not slow'
 
 test-slow: build window ## Run those of the second: what takes long for what it guards
+	cargo test --release -p clouds_demo -- --ignored
 	$(PYTEST) -m slow
 
 test-all: test test-slow ## Run all tests

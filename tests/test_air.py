@@ -209,7 +209,7 @@ def test_dusk_does_not_pop():
     assert np.percentile(fine, 99) < 0.65 * np.percentile(coarse, 99)
 
 
-@pytest.mark.slow_after(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("radius", [1e4, 400_000.0, 6_371_000.0, 1e9])
 @pytest.mark.parametrize("haze", [0.0, 20.0])
 def test_finite_everywhere(radius, haze):

@@ -115,7 +115,7 @@ CUTS = {
 }
 
 
-@pytest.mark.slow_after(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("cut", CUTS)
 def test_a_cut_shows_nothing_of_the_shot_before(renderer, cut):
     make = renderer(*SIZE)

@@ -237,6 +237,7 @@ def test_every_camera_sees_the_same(kind):
     np.testing.assert_allclose(lack(camera, params, size)[pixel], expected, rtol=0.05)
 
 
+@pytest.mark.slow
 def test_a_panorama_has_no_seam():
     params = smooth(**{"sun.elevation": 20.0, "sun.azimuth": 170.0})
     seen = lack(nubis.Camera.equirect((0, 0, 200.0)), params, (240, 120))[30:90]

@@ -169,6 +169,7 @@ def test_quick_run(quick):
         assert small == pytest.approx(found["draft"]["evaluations"] / 16, rel=0.25)
 
 
+@pytest.mark.slow
 def test_quick_table(quick):
     """The table holds what the JSON holds."""
     rows = json.loads((quick / "results.json").read_text())["rows"]
@@ -179,6 +180,7 @@ def test_quick_table(quick):
         assert line == {k: "" if v is None else str(v) for k, v in row.items()}
 
 
+@pytest.mark.slow
 def test_quick_shapes(quick):
     found = json.loads((quick / "shapes.json").read_text())
     (sweep,) = found["sweeps"]
@@ -189,6 +191,7 @@ def test_quick_shapes(quick):
     assert all(r["evaluations"] <= r["evaluations_in_step"] for r in sweep["rows"])
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not find_spec("matplotlib"), reason="the extra `bench` is not installed")
 def test_quick_plots(quick):
     names = {path.stem for path in (quick / "plots").iterdir()}
@@ -198,6 +201,7 @@ def test_quick_plots(quick):
     assert all(path.stat().st_size < 150 * 1024 for path in (quick / "plots").iterdir())
 
 
+@pytest.mark.slow
 def test_quick_page(quick, tmp_path):
     """All blocks are filled; what was not measured is left."""
     copy = tmp_path / "accuracy.md"
@@ -337,6 +341,7 @@ def test_no_optimisation_in_closed_form(panels):
     assert (reads[up < -0.01] == 0).all() and (up > 0.01).any()
 
 
+@pytest.mark.slow
 def test_no_optimisation_costs_more(panels):
     """At no pixel for those of the thesis but the last, whose steps back may, and in the mean."""
     names = list(panels)

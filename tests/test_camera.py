@@ -28,6 +28,7 @@ def brightest(renderer, camera, azimuth, elevation, size):
     return int(x), int(y)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pixel", [(32, 10), (31, 20), (50, 5), (63, 30), (0, 30), (10, 15)])
 def test_equirect(renderer, pixel):
     """Centre north, right clockwise from above, top the zenith; pixel centres at half-integers."""
@@ -65,6 +66,7 @@ def test_fisheye(renderer, azimuth, side, fov):
     assert max(offset, key=offset.get) == side
 
 
+@pytest.mark.slow
 def test_fisheye_that_looks_at_the_horizon(renderer):
     """Its top is as far north as can be: looking south that is the zenith, and east is on the
     left.

@@ -293,6 +293,7 @@ def test_the_upper_deck_has_its_own_wind(renderer, rng, time):
     )
 
 
+@pytest.mark.slow
 def test_decks_in_pictures(renderer):
     """A mean depth in the deck that is seen: from below, between and above."""
     params = nubis.Params().with_(

@@ -188,6 +188,7 @@ def test_the_nearer_of_high_and_marched_clouds_is_before():
     assert relative_rmse(few, full) < 0.01
 
 
+@pytest.mark.slow
 def test_what_opaque_clouds_hide_is_not_missed():
     """A picture is made of its layers, for which all that is hidden is worked out."""
     make = nubis.Renderer(320, 184, quality=quality(0.5))

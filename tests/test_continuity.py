@@ -62,7 +62,7 @@ def picture(renderer):
     return render
 
 
-@pytest.mark.slow_after(1)
+@pytest.mark.slow
 @each(SWITCHES)
 def test_nothing_is_the_limit_of_little(picture, group, name):
     """A picture with 0 and one with next to 0, root mean square, of the mean of the picture as it

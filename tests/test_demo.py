@@ -162,6 +162,7 @@ def check_screenshot(
     assert np.median(panel) < 60 < panel.max()
 
 
+@pytest.mark.slow
 @needs_display
 def test_frames_and_a_screenshot(display, tmp_path):
     """The window leaves by itself."""
@@ -173,6 +174,7 @@ def test_frames_and_a_screenshot(display, tmp_path):
     check_screenshot(tmp_path / "window.png", 1, CORNER, VIEW)
 
 
+@pytest.mark.slow_after(1)
 @needs_display
 @pytest.mark.parametrize(
     "arguments",
@@ -200,6 +202,7 @@ def test_a_window_without_room_for_a_picture_says_so(display, tmp_path):
         assert demo.process.returncode == 1 and "--size" in errors
 
 
+@pytest.mark.slow
 @needs_display
 def test_a_screen_of_two_pixels_a_point(display, tmp_path, monkeypatch):
     monkeypatch.setenv("WINIT_X11_SCALE_FACTOR", "2")
@@ -211,6 +214,7 @@ def test_a_screen_of_two_pixels_a_point(display, tmp_path, monkeypatch):
     check_screenshot(tmp_path / "window.png", 2, (720, 188), (560, 562))
 
 
+@pytest.mark.slow
 @needs_display
 def test_a_user_flies_paints_saves_and_goes_on_in_python(display, tmp_path, monkeypatch):
     with Window(display, tmp_path) as demo:
@@ -246,6 +250,7 @@ def test_a_user_flies_paints_saves_and_goes_on_in_python(display, tmp_path, monk
     assert linear.weather.map is not None
 
 
+@pytest.mark.slow
 @needs_display
 def test_panoramas_and_recordings(display, tmp_path):
     with Window(display, tmp_path, "--scene", "cirrus") as demo:
@@ -276,6 +281,7 @@ def test_panoramas_and_recordings(display, tmp_path):
     assert off(coarse[dim], small[dim]) < 0.15
 
 
+@pytest.mark.slow
 @needs_display
 def test_a_window_is_resized_and_small_and_closed_in_the_middle_of_a_picture(display, tmp_path):
     with Window(display, tmp_path, "--scene", "storm") as demo:

@@ -180,6 +180,7 @@ def test_no_coverage_is_no_cloud(renderer, rng):
     assert (renderer().density(points, params) == 0).all()
 
 
+@pytest.mark.slow
 def test_more_coverage_is_more_cloud(renderer):
     """From clear to overcast, seen from the ground; overcast hides the sky nearly everywhere."""
     camera = nubis.Camera.fisheye((0, 0, 0), fov=120)

@@ -95,6 +95,7 @@ def test_flux_across_the_seam_of_a_panorama(renderer, azimuth):
         np.testing.assert_allclose(flux, params.sun.irradiance, rtol=0.003)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fov_y", [0.5, 2.0, 10.0, 60.0, 120.0])
 def test_flux_of_the_disc_in_pinholes(renderer, fov_y):
     """Panned by parts of a pixel, in the middle and toward a corner."""
@@ -153,6 +154,7 @@ def test_each_pixel_has_its_share_of_the_disc(renderer, fov_y):
         np.testing.assert_allclose(disc[..., channel], mean, rtol=0.02, atol=0.004 * mean.max())
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("up", [-0.9, -0.4, 0.0, 0.4, 0.9])
 @pytest.mark.parametrize("size", [(64, 32), (1024, 512), (160, 90)])
 def test_a_setting_sun_has_the_part_that_is_up(renderer, up, size):

@@ -40,6 +40,7 @@ def compare(actual, golden):
     return int((excess > 1).sum()), excess
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("scene", SCENES)
 def test_golden(renderer, scene):
     make = renderer(*SIZE, "balanced")

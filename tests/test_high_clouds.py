@@ -539,6 +539,7 @@ def test_no_seam_at_the_horizon_of_the_layer(renderer, height):
 # --- A sky of nothing else --------------------------------------------------------------------
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("scene", ["mackerel", "procedural_sky"])
 def test_nothing_is_marched(renderer, scene):
     camera, params = nubis.scenes[scene]

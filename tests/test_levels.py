@@ -169,6 +169,7 @@ def test_presets_hide_as_much_of_the_sky_as_their_names_say(renderer):
     assert levels == sorted(levels)
 
 
+@pytest.mark.slow
 def test_command_line(tmp_path, capsys):
     """A preset in place of a scene's clouds, under its sun; a cover on top; unknown names."""
     assert main(["presets"]) == 0

@@ -210,6 +210,7 @@ def test_rain_clouds_are_darker(model):
     assert (wet <= dry).all() and (wet < dry).any()
 
 
+@pytest.mark.slow
 def test_shadows_of_the_deck_above(renderer):
     """Samples toward the sun find a deck that is far and thin, against eight times as many. When
     all of them grew with their distance, a balanced picture was 15 % off, not 3.

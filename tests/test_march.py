@@ -538,7 +538,7 @@ def test_any_size(renderer, size):
 HEIGHTS = [-5.0, 0.01, 1199.99, 1200.01, 3199.99, 3200.01, 20_000.0, 400_000.0, 4e7]
 
 
-@pytest.mark.slow_after(2)
+@pytest.mark.slow
 @pytest.mark.parametrize("height", HEIGHTS)
 def test_anywhere(renderer, height):
     """On the ground, a centimetre from each side of the shell, in orbit: finite and in range in

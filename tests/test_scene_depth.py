@@ -200,6 +200,7 @@ def test_partial_cover_is_a_mixture():
     assert np.allclose(frame, expected, rtol=1e-4, atol=1e-5)
 
 
+@pytest.mark.slow
 def test_high_clouds_and_sun_are_behind_it():
     """A scene below the high clouds hides them, and the sun's disc."""
     params = nubis.Params().with_(
@@ -247,6 +248,7 @@ def ridge(size, shift):
     return np.where(y > top, np.float32(1500.0), INF).astype(np.float32)
 
 
+@pytest.mark.slow
 def test_an_animation_of_a_scene_that_stands_still_becomes_the_still():
     size = 96, 54
     ours = nubis.Renderer(*size, quality="balanced")

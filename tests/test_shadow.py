@@ -361,6 +361,7 @@ def test_sun_visibility_through_a_slab(depth):
     assert seen.ambient == pytest.approx(expected, abs=1e-4)
 
 
+@pytest.mark.slow
 def test_sun_visibility_over_ground_and_scene():
     params = nubis.Params().with_(
         **{"clouds.coverage": 0.0, "high_clouds.coverage": 0.0, "sun.azimuth": 0.0}

@@ -81,6 +81,7 @@ def test_what_is_between_is_put_where_it_belongs():
         assert np.median(ratio) == pytest.approx(1, abs=0.01)
 
 
+@pytest.mark.slow
 def test_layers_are_those_of_the_still():
     camera, params, _ = next(shots(1))
     make = nubis.Renderer(*SIZE, quality=PREVIEW)
@@ -245,6 +246,7 @@ def test_from_above_the_high_clouds(altitude):
     assert got.mean() == pytest.approx(rays.mean(), rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_scene_has_each_ray_at_its_edges():
     """It is followed pixel by pixel, and what comes after it begins with a still."""
     camera, params, _ = next(shots(1))

@@ -169,6 +169,7 @@ def test_more_orders_are_more_light(renderer):
     assert light == sorted(light) and light[3] > 1.3 * light[0]
 
 
+@pytest.mark.slow
 def test_a_static_shot_goes_on_tracing(renderer):
     """Each frame of an animation has the paths of those before it, and no path twice; the standard
     error tells how far two of them are apart.
@@ -198,6 +199,7 @@ def test_a_converged_shot_stays(renderer):
     assert all(frame.tobytes() == still.tobytes() for frame in frames)
 
 
+@pytest.mark.slow
 def test_paths_in_the_sky(renderer):
     """With air and ground: brighter than the sun alone makes it, and the ground's albedo is seen
     from below.

@@ -126,7 +126,7 @@ HIGH = {
 UP = nubis.Camera.look_at((0, 0, 100), (0, 1000, 900))
 
 
-@pytest.mark.slow_after(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("quality", ["draft", "reference"])
 @pytest.mark.parametrize("model", ["nubis2015", "path"])
 def test_a_grid_is_all_the_cloud_there_is(renderer, quality, model):

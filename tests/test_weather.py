@@ -650,6 +650,7 @@ class TestBakes:
             sky = sky.with_(**{name: value})
             assert self.ran(renderer, sky) == {"weather"}, name
 
+    @pytest.mark.slow
     def test_a_weight_runs_the_mixture_alone(self):
         renderer = nubis.Renderer(8, 4, quality="draft")
         a, b, c = (Weather(seed=self.SEED + 10 + i) for i in range(3))
@@ -683,6 +684,7 @@ class TestAnimation:
         shots = ((camera, sky, 0.1 * i) for i, sky in enumerate(skies))
         return ["reproject" in renderer.timings for _ in renderer.animate(shots)]
 
+    @pytest.mark.slow
     def test_a_change_does_not_cut(self):
         a, b = Weather(seed=21), Weather(seed=22)
         blend = WeatherBlend(a).change(b, 0.0, 5.0)

@@ -89,6 +89,7 @@ fn stretch(image: &[f32], [w, h]: [u32; 2], [width, height]: [u32; 2]) -> Vec<f3
 /// Wherever it is: the next picture is that of a renderer to which nothing has happened. A frame of `draft` asks once, one that
 /// converges in many submissions often. Each time the sun stands elsewhere, so that what is baked from it is recorded, too.
 #[test]
+#[ignore = "is in the second tier, `make test-slow`"]
 fn what_is_interrupted_leaves_nothing_behind() {
     for (quality, questions) in [("draft", 1), ("reference", 3)] {
         let [mut renderer, mut other] = [(); 2].map(|()| renderer_by(quality, 16, 10));
@@ -126,6 +127,7 @@ fn an_animation_goes_on_in_another_size() {
 
 /// `preview` follows one in sixteen of the larger pictures' pixels, as they are narrow, and each of the smaller ones'.
 #[test]
+#[ignore = "is in the second tier, `make test-slow`"]
 fn an_animation_goes_on_with_other_pixels_known() {
     goes_on("preview", [640, 500], "preview", [720, 562]);
     goes_on("preview", [640, 500], "draft", [320, 250]);

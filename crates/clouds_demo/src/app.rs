@@ -517,7 +517,7 @@ impl App {
         let shown = self.shown.as_ref().and_then(|shown| shown.map.as_ref());
         let map = self.params.weather.map.clone().or_else(|| shown.cloned());
         let Ok(camera) = self.flight.camera() else { return };
-        let eye = Frame::new(&camera, &self.params, self.time, [1, 1]).weather_origin;
+        let eye = Frame::new(&camera, &self.params, self.time, [1, 1]).sky.weather_origin;
         self.weather.show(ui, &mut self.params, map.as_ref(), eye);
     }
 

@@ -103,7 +103,7 @@ def copied(text):
 
 @pytest.mark.parametrize("path", FILES + RUST, ids=lambda path: path.relative_to(ROOT).as_posix())
 def test_no_copies(path):
-    """What Rust and WGSL share is declared once (crates/clouds_core/src/constants.rs)."""
+    """What Rust and WGSL share is declared once (crates/clouds_core/src/shared.rs)."""
     assert not copied(text_of(path))
 
 

@@ -3,7 +3,7 @@
 #import params
 #import uniforms
 
-// What a pipeline is made for; the rest is compiled out (crates/clouds_core/src/kernel.rs).
+// What a pipeline is made for; the rest is compiled out (crates/clouds_core/src/gpu/kernel.rs).
 override MODEL: u32 = 0u; // light.model
 override PHASE: u32 = 0u; // light.phase
 override VOLUME: bool = false; // the clouds are the user's grid, not procedural

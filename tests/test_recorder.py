@@ -56,7 +56,7 @@ def test_a_warm_picture_is_submitted_and_waited_for_once(quality, pictures):
 @pytest.mark.slow
 def test_a_long_still_is_submitted_as_seldom_as_may_be():
     """Two submissions, and one more for each eighth of a second of work at most: a fourth of a
-    slice, as kernels may be thought to take longer than they did. On two quiet cores it is two.
+    slice, as kernels may be thought to take longer than they did.
     """
     for submissions, waits, seconds in run(
         COUNT.format(**LARGE, quality="balanced", pictures=STILLS)

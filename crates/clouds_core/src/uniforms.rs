@@ -1,8 +1,7 @@
 //! The uniform blocks that follow from a picture, by how long they hold: `frame` with its parts `view` and `sky`, and `dispatch`.
 //! The third, `params`, is what the user sets.
 
-use crate::gpu::Binding;
-use crate::gpu::Gpu;
+use crate::gpu::{Binding, Gpu};
 use crate::schema::{self, Block};
 
 crate::params! {

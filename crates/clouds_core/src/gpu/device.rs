@@ -18,7 +18,7 @@ use crate::shared::constants;
 /// Asked while waiting: an error stops the work (Ctrl-C).
 pub type Interrupt<'a> = &'a dyn Fn() -> Result<()>;
 
-/// How long one submission, meant to take a tenth of a second, may take before the device counts as hung.
+/// How long one submission, meant to take half a second, may take before the device counts as hung.
 const HUNG: Duration = Duration::from_secs(300);
 /// How long to wait between looks at the caller's interrupt.
 const SLICE: Duration = Duration::from_millis(100);

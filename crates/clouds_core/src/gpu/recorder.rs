@@ -23,8 +23,6 @@ use crate::shared::constants;
 /// Longest that one submission usually keeps the device busy, s, and that one dispatch does whose list is as long as it can be: a
 /// fourth of the two seconds after which Windows resets a device. After Ctrl-C two of them go on.
 const SLICE_SECONDS: f64 = 0.5;
-/// The uniform block that differs from slice to slice.
-const PER_DISPATCH: &str = "dispatch";
 /// Most workgroups along one side of a dispatch (WebGPU's default limit).
 const MOST_GROUPS: u32 = 65_535;
 /// What uniform blocks are aligned to, bytes (WebGPU's default limit).
@@ -185,13 +183,13 @@ impl<'a> Recorder<'a> {
     }
 
     /// Runs a kernel over `rows` rows of `width` invocations, in slices where it may take long, each with the uniform block
-    /// [`PER_DISPATCH`] that `block` makes for it.
+    /// that `block` makes for it, by name.
     pub fn dispatch_rows(
         &mut self,
         name: Name,
         bindings: &Bindings,
         [width, rows]: [u32; 2],
-        block: impl Fn(Range<u32>) -> Binding,
+        block: impl Fn(Range<u32>) -> (&'static str, Binding),
     ) {
         // Whole workgroups.
         let group = u64::from(GRID_GROUP);
@@ -200,14 +198,20 @@ impl<'a> Recorder<'a> {
         for first in (0..rows).step_by(most as usize) {
             let slice = first..(first + most).min(rows);
             let size = [width, slice.len() as u32, 1];
-            self.dispatch(name, [&[(PER_DISPATCH, block(slice))], bindings.as_slice()].concat(), size);
+            self.dispatch(name, [&[block(slice)], bindings.as_slice()].concat(), size);
         }
     }
 
     /// Runs a kernel over the entries of a list, as many as there will be, in slices where it may take long. The list is empty
-    /// afterwards. `block` makes the uniform block [`PER_DISPATCH`] for the number of the first invocation; `listed` holds the
+    /// afterwards. `block` makes a uniform block, by name, for the number of the first invocation; `listed` holds the
     /// number of all.
-    pub fn dispatch_list(&mut self, name: Name, bindings: &Bindings, list: &List<'_>, block: impl Fn(u32) -> Binding) {
+    pub fn dispatch_list(
+        &mut self,
+        name: Name,
+        bindings: &Bindings,
+        list: &List<'_>,
+        block: impl Fn(u32) -> (&'static str, Binding),
+    ) {
         let invocations = list.most * list.each;
         let most = self.gpu.most_invocations(name.1, SLICE_SECONDS) / u64::from(LIST_GROUP) * u64::from(LIST_GROUP);
         let most = most.clamp(LIST_GROUP.into(), (LIST_GROUP * MOST_GROUPS).into()) as u32;
@@ -225,7 +229,7 @@ impl<'a> Recorder<'a> {
         self.clear(list.count);
         for slice in 0..slices {
             let argument = first + slice;
-            let ours = [(PER_DISPATCH, block(slice * most)), ("listed", Binding::Arguments(argument..argument + 1))];
+            let ours = [block(slice * most), ("listed", Binding::Arguments(argument..argument + 1))];
             let which = Which::Named(name, self.specialization.clone());
             // Under a condition it is as a rule empty.
             let likely = if self.condition.is_some() { 0.0 } else { list.likely * f64::from(invocations) };

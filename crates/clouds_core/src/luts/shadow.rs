@@ -72,6 +72,6 @@ pub(crate) fn map(rec: &mut Recorder<'_>, frame: &Frame, size: u32, out: &wgpu::
     let bindings = [&[("shadow_out", out.into())], frame.bindings(rec.gpu).as_slice()].concat();
     let gpu = rec.gpu;
     rec.dispatch_rows(("shadow", "shadow_map"), &bindings, [size, size], |rows| {
-        Dispatch { first_row: rows.start, rows: rows.len() as u32, ..frame.dispatch.clone() }.binding(gpu).1
+        Dispatch { first_row: rows.start, rows: rows.len() as u32, ..frame.dispatch.clone() }.binding(gpu)
     });
 }

@@ -90,12 +90,12 @@ pub(crate) fn record(rec: &mut Recorder<'_>, frame: &Frame, params: &Params, par
         rec.dispatch(("composite", "composite_cells"), cells, [columns, rows, 1]);
         let list = refined.list(columns * rows, TILE * TILE, ROUGH);
         rec.dispatch_list(("composite", "composite_list"), &ours, &list, |first_ray| {
-            Dispatch { first_ray, ..whole.clone() }.binding(gpu).1
+            Dispatch { first_ray, ..whole.clone() }.binding(gpu)
         });
     } else {
         rec.dispatch_rows(("composite", "composite"), &ours, [frame.view.width, frame.dispatch.rows], |rows| {
             let (first_row, rows) = (frame.dispatch.sheet_row + rows.start, rows.len() as u32);
-            Dispatch { first_row, rows, ..whole.clone() }.binding(gpu).1
+            Dispatch { first_row, rows, ..whole.clone() }.binding(gpu)
         });
     }
     for [first_column, first_row, columns, rows] in frame.disc_pixels(params) {

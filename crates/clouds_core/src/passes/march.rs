@@ -14,7 +14,7 @@ pub(crate) fn record(rec: &mut Recorder<'_>, frame: &Frame, quality: &Quality, r
         let size = [frame.dispatch.march_width, frame.dispatch.sheet_rows];
         return rec.dispatch_rows(("march", "march"), &out.bindings(), size, |rows| {
             let (first_row, rows) = (frame.dispatch.sheet_row + rows.start, rows.len() as u32);
-            Dispatch { first_row, rows, ..frame.dispatch.clone() }.binding(gpu).1
+            Dispatch { first_row, rows, ..frame.dispatch.clone() }.binding(gpu)
         });
     }
     let mut frame = frame.clone();
@@ -41,6 +41,6 @@ pub(crate) fn list(rec: &mut Recorder<'_>, frame: &Frame, most: u32, likely: f64
     let gpu = rec.gpu;
     let bindings = [out.bindings(), refined.bindings()].concat();
     rec.dispatch_list(("march", "march_list"), &bindings, &refined.list(most, 1, likely), |first_ray| {
-        Dispatch { first_ray, ..frame.dispatch.clone() }.binding(gpu).1
+        Dispatch { first_ray, ..frame.dispatch.clone() }.binding(gpu)
     });
 }

@@ -121,7 +121,7 @@ pub(crate) fn record(rec: &mut Recorder<'_>, frame: &Frame, quality: &Quality, i
     rec.dispatch_rows(("reproject", "reproject"), &read, [columns, rows], |slice| {
         let (first_row, rows) = (stride * slice.start, stride * slice.len() as u32);
         let rows = rows.min(frame.known()[1] - first_row);
-        Dispatch { first_row, rows, ..rays.dispatch.clone() }.binding(gpu).1
+        Dispatch { first_row, rows, ..rays.dispatch.clone() }.binding(gpu)
     });
 
     // A still, where most rays are not what the past says, or more pixels are listed than one marches.

@@ -107,6 +107,8 @@ struct Failure {
     /// The first error that no call has reported yet.
     error: Option<String>,
     lost: bool,
+    /// The thread of the window that shares the device, whose errors are its own.
+    window: Option<thread::ThreadId>,
 }
 
 impl Gpu {
@@ -126,8 +128,12 @@ impl Gpu {
         Ok(gpu)
     }
 
-    /// What a window needs that shows pictures of this device without bringing them to memory.
+    /// What a window needs that shows pictures of this device without bringing them to memory. Calling thread: the window's
+    /// from here on, which renders no clouds. Errors of that thread cost the window one of its frames and are no errors of
+    /// the renderer: a surface whose size changes while the device is busy cannot be configured, and what is then drawn to
+    /// it at the new size is refused, until the device has time.
     pub fn shared(&self) -> (wgpu::Instance, wgpu::Adapter, wgpu::Device, wgpu::Queue) {
+        lock(&self.failure).window = Some(thread::current().id());
         let instance = adapter::instance().clone();
         (instance, self.adapter.clone(), self.device.clone(), self.queue.clone())
     }
@@ -149,12 +155,11 @@ impl Gpu {
 
         let failure = Arc::new(Mutex::new(Failure::default()));
         let reported = failure.clone();
-        // Without this wgpu panics on the first error.
+        // Without this wgpu panics on the first error. wgpu calls it on the thread of the call that failed.
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
-            // A window's own business (`Gpu::shared`): its surface cannot be made anew while we keep the device busy, and is
-            // as soon as we do not.
-            if !error.to_string().contains("In Surface::") {
-                lock(&reported).error.get_or_insert_with(|| error.to_string());
+            let mut failure = lock(&reported);
+            if failure.window != Some(thread::current().id()) {
+                failure.error.get_or_insert_with(|| error.to_string());
             }
         }));
         let reported = failure.clone();
@@ -500,5 +505,35 @@ impl Drop for Download {
         if self.mapped {
             self.buffer.unmap();
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Asks for what no device has: a buffer of 2^60 bytes.
+    fn err(gpu: &Gpu) {
+        gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: None,
+            size: 1 << 60,
+            usage: wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+    }
+
+    #[test]
+    fn errors_of_a_window_are_its_own() {
+        let gpu = Gpu::open(None).unwrap();
+        let renders = gpu.clone();
+        thread::spawn(move || {
+            gpu.shared();
+            err(&gpu);
+            gpu.check().expect("the window's thread has erred");
+        })
+        .join()
+        .unwrap();
+        err(&renders);
+        assert!(renders.check().is_err());
     }
 }

@@ -102,7 +102,7 @@ class Window:
         self.do("mousedown", 1)
         time.sleep(0.3)
         self.do("mouseup", 1)
-        # A frame of the window that sees the release and the next move together takes the latter for the former's place.
+        # A late frame handles the release and the next move together, and puts both there.
         time.sleep(1)
 
     def drag(self, x: int, y: int, dx: int, dy: int) -> None:

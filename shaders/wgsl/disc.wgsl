@@ -37,10 +37,15 @@ fn moon_disc() -> Disc {
 // Radiance that a pixel gets of the discs, on average, through the air.
 fn discs_in_pixel(pixel: vec2u) -> vec3f {
     var light = vec3f(0.0);
-    if params.sun.visible > 0u {
-        light += disc_in_pixel(sun_disc(), vec2f(pixel));
+    // A loop: a kernel holds a function once for each place that calls it, and this one takes seconds to compile.
+    for (var k = 0u; k < 2u; k++) {
+        var disc = sun_disc();
+        if k == 1u {
+            disc = moon_disc();
+        }
+        let visible = k == 1u || params.sun.visible > 0u;
+        light += select(vec3f(0.0), disc_in_pixel(disc, vec2f(pixel)), visible);
     }
-    light += disc_in_pixel(moon_disc(), vec2f(pixel));
     // Beside a disc rounding may leave less than nothing.
     return max(light, vec3f(0.0)) / pixel_solid_angle(vec2f(pixel));
 }
@@ -76,11 +81,7 @@ fn disc_in_part(disc: Disc, plane: DiscPlane, low: vec2f, high: vec2f) -> vec3f 
             let to_corner = select(from_corner + size, high, vec2f(x, y) + 1.0 == pieces);
             let region = clipped(pixel_polygon(plane, from_corner, to_corner), vec2f(0.0, 1.0), plane.horizon);
             let through = disc_transmittance(view_direction(0.5 * (from_corner + to_corner)).xyz);
-            if disc.phase < 1.0 {
-                share += through * lit_share(region, plane.bright, disc.phase);
-            } else {
-                share += through * polygon_share(region, 1.0 + 0.5 * disc.limb);
-            }
+            share += through * lit_share(region, plane.bright, disc.phase, 1.0 + 0.5 * disc.limb);
         }
     }
     return share;
@@ -199,17 +200,21 @@ fn polygon_share(polygon: Polygon, exponent: vec3f) -> vec3f {
 }
 
 // The same of what is lit of a ball, on average as bright everywhere: the half of its disc toward the light, and beyond that, or
-// less, half an ellipse, which is a disc that is squeezed.
-fn lit_share(region: Polygon, bright: vec2f, phase: f32) -> f32 {
-    let half_disc = polygon_share(clipped(region, bright, 0.0), vec3f(1.0)).x;
-    var squeezed = clipped(region, select(bright, -bright, phase > 0.0), 0.0);
+// less, half an ellipse, which is a disc that is squeezed. Of a full one all of its disc.
+fn lit_share(region: Polygon, bright: vec2f, phase: f32, exponent: vec3f) -> vec3f {
+    let full = phase >= 1.0;
     let narrow = max(abs(phase), 1e-3);
-    for (var i = 0u; i < squeezed.count; i++) {
-        let at = squeezed.corners[i];
-        squeezed.corners[i] = at + bright * (dot(at, bright) * (1.0 / narrow - 1.0));
+    var sum = vec3f(0.0);
+    for (var k = 0u; k < select(2u, 1u, full); k++) {
+        let ellipse = k == 1u;
+        var part = clipped(region, select(bright, -bright, ellipse && phase > 0.0), select(0.0, -1e30, full));
+        for (var i = 0u; i < select(0u, part.count, ellipse); i++) {
+            let at = part.corners[i];
+            part.corners[i] = at + bright * (dot(at, bright) * (1.0 / narrow - 1.0));
+        }
+        sum += select(1.0, phase, ellipse) * polygon_share(part, exponent);
     }
-    let ellipse = phase * polygon_share(squeezed, vec3f(1.0)).x;
-    return (half_disc + ellipse) / max(0.5 * (1.0 + phase), 1e-4);
+    return select(sum / max(0.5 * (1.0 + phase), 1e-4), sum, full);
 }
 
 // Places and weights of Gauss and Legendre's rule with four points, from -1 to 1.

@@ -3,7 +3,7 @@
 #import workgroups
 #import camera
 #import atmosphere
-#import disc
+#import aerial
 #import high_light
 #import lattice
 #import scene_depth
@@ -67,7 +67,8 @@ fn compose(pixel: vec2u) {
     let scene = scene_distance(pixel);
     var sight = sight_of(view.xyz, vec2f(pixel), pixel, scene, here);
     if DISCS {
-        sight.background += select(discs_in_pixel(pixel), vec3f(0.0), scene < NO_SCENE);
+        // As `discs` has left it there.
+        sight.background += select(image[index].rgb, vec3f(0.0), scene < NO_SCENE);
     }
     put(index, sight);
 }

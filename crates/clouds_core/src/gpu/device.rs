@@ -514,7 +514,7 @@ mod tests {
 
     /// Asks for what no device has: a buffer of 2^60 bytes.
     fn err(gpu: &Gpu) {
-        gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        let _ = gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: None,
             size: 1 << 60,
             usage: wgpu::BufferUsages::COPY_DST,

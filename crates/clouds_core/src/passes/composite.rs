@@ -102,6 +102,7 @@ pub(crate) fn record(rec: &mut Recorder<'_>, frame: &Frame, params: &Params, par
         let pixels = Dispatch { first_column, first_row, columns, rows, ..whole.clone() };
         let usual = rec.specialize_with(&[("DISCS", 1.0)]);
         let bindings = [vec![pixels.binding(gpu)], ours.clone()].concat();
+        rec.dispatch(("discs", "discs"), bindings.clone(), [columns, rows, 1]);
         rec.dispatch(("composite", "composite_discs"), bindings, [columns, rows, 1]);
         rec.specialize(usual);
     }

@@ -1,10 +1,10 @@
-//! The keys, for who asks, and the way back from the view alone.
+//! On-screen help: the list of keys, and a hint while the panels are hidden.
 
 use std::time::{Duration, Instant};
 
 use eframe::egui::{self, Align2, Color32, FontId, Key, Ui};
 
-/// Keys and mouse, and what they do. The same as in docs/demo.md.
+/// Controls and their effects. docs/demo.md has the same table.
 const KEYS: [(&str, &str); 10] = [
     ("W  A  S  D", "forward, left, back, right"),
     ("Q  E", "down, up"),
@@ -17,11 +17,11 @@ const KEYS: [(&str, &str); 10] = [
     ("F2", "the view alone, or with its panels"),
     ("Control Q", "leave"),
 ];
-/// How long the view alone says how to leave it.
-const REMINDER: Duration = Duration::from_secs(4);
+/// Duration of the hint after the panels are hidden.
+const HINT_DURATION: Duration = Duration::from_secs(4);
 
-/// The list of keys, where it is open; F1, Esc and its button close it.
-pub fn keys(context: &egui::Context, open: &mut bool) {
+/// Window with the list of keys; Esc and its close button set `open` to false.
+pub fn key_window(context: &egui::Context, open: &mut bool) {
     if !*open {
         return;
     }
@@ -31,34 +31,33 @@ pub fn keys(context: &egui::Context, open: &mut bool) {
     let window = egui::Window::new("Keys").anchor(Align2::CENTER_CENTER, [0.0; 2]).collapsible(false).resizable(false);
     window.open(open).show(context, |ui| {
         egui::Grid::new("keys").num_columns(2).spacing([16.0, 6.0]).show(ui, |ui| {
-            for (key, what) in KEYS {
+            for (key, effect) in KEYS {
                 ui.strong(key);
-                ui.label(what);
+                ui.label(effect);
                 ui.end_row();
             }
         });
     });
 }
 
-/// Says for some seconds how the panels come back.
-pub fn way_back(ui: &Ui, view: egui::Rect, since: Instant) {
-    let left = REMINDER.saturating_sub(since.elapsed());
-    if left.is_zero() {
+/// Hint how to bring the panels back, for [`HINT_DURATION`] after they were hidden.
+pub fn panel_hint(ui: &Ui, view: egui::Rect, hidden_since: Instant) {
+    let remaining = HINT_DURATION.saturating_sub(hidden_since.elapsed());
+    if remaining.is_zero() {
         return;
     }
-    let at = view.center_bottom() - egui::vec2(0.0, 12.0);
+    let anchor = view.center_bottom() - egui::vec2(0.0, 12.0);
     let text = |offset: f32, colour| {
-        let at = at + egui::Vec2::splat(offset);
         ui.painter().text(
-            at,
+            anchor + egui::Vec2::splat(offset),
             Align2::CENTER_BOTTOM,
             "F2 brings the panels back, F1 lists the keys",
             FontId::default(),
             colour,
         );
     };
-    // Legible before bright clouds and before the night.
+    // Drop shadow: legible over bright clouds and over a night sky.
     text(1.0, Color32::BLACK);
     text(0.0, Color32::WHITE);
-    ui.ctx().request_repaint_after(left);
+    ui.ctx().request_repaint_after(remaining);
 }

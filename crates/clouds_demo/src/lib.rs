@@ -1,15 +1,15 @@
-//! Fly through the sky: a window on the clouds of `clouds_core`, on the same device.
+//! Interactive demo of `clouds_core`: a window that shares its GPU device with the renderer.
 //!
-//! [`app`] is the window, top to bottom. [`painter`] makes its pictures on a thread of its own.
+//! [`app`] is the window. [`render_thread`] renders its frames on a separate thread.
 
 pub mod app;
+pub mod debug_view;
 pub mod flight;
 pub mod help;
-pub mod painter;
 pub mod panel;
 pub mod preset;
+pub mod render_thread;
 pub mod resolution;
-pub mod sight;
+pub mod shader_watch;
 pub mod sun;
-pub mod watch;
 pub mod weather;

@@ -1,4 +1,4 @@
-//! `clouds_demo`: opens the window.
+//! Command line of the demo.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -8,12 +8,13 @@ use std::sync::Arc;
 use anyhow::{Context as _, Result, anyhow, bail, ensure};
 use clap::Parser;
 use clouds_core::Gpu;
-use clouds_demo::app::{App, Start};
+use clouds_demo::app::{App, Options};
 use eframe::egui::ViewportBuilder;
 use eframe::egui_wgpu::{WgpuConfiguration, WgpuSetup, WgpuSetupExisting};
 
-/// Fly through clouds. W A S D move, Q and E go down and up, F lands and takes off, Space jumps, Shift is fast, Control slow,
-/// the wheel sets the speed, F1 lists the keys, F2 hides the panels, Control and Q leave; drag to look around, or click to take the pointer and press Esc to give it back.
+/// Fly through clouds. W A S D move, Q and E go down and up, F lands and takes off, Space jumps, Shift is fast,
+/// Control slow, the wheel sets the speed, F1 lists the keys, F2 hides the panels, Control and Q leave; drag to look
+/// around, or click to take the pointer and press Esc to give it back.
 #[derive(Parser)]
 struct Arguments {
     /// A scene, such as fair_weather or storm, or a TOML file
@@ -25,16 +26,16 @@ struct Arguments {
     /// Part of the name of the adapter (see `python -m nubis adapters`)
     #[arg(long, env = "NUBIS_ADAPTER")]
     adapter: Option<String>,
-    /// Frames a second that are wanted while anything moves: the resolution follows
+    /// Target frame rate while anything moves, frames per second: the resolution adapts to it
     #[arg(long, value_parser = rate)]
     rate: Option<f64>,
-    /// Leave after so many pictures, or where nothing moves after the one at rest, which is the second
+    /// Leave after this many frames; if nothing moves, leave after the still, which is the second frame
     #[arg(long, value_parser = clap::value_parser!(u64).range(1..))]
     frames: Option<u64>,
     /// Save a picture of the window (PNG) before leaving
     #[arg(long, requires = "frames", value_parser = png)]
     screenshot: Option<PathBuf>,
-    /// Fly ahead from the first picture on
+    /// Fly ahead from the first frame on
     #[arg(long)]
     fly: bool,
 }
@@ -63,12 +64,13 @@ fn rate(text: &str) -> Result<f64> {
 
 fn main() -> ExitCode {
     for (name, value) in clouds_core::gpu::driver_settings() {
-        // SAFETY: there is no other thread yet.
+        // SAFETY: no other thread exists yet.
         unsafe { std::env::set_var(name, value) };
     }
     #[cfg(debug_assertions)]
     if std::env::var_os("NUBIS_SHADERS").is_none() {
-        // SAFETY: there is no other thread yet. Builds for work on the shaders read them from where they are.
+        // Debug builds read the shaders from the source tree, for hot reload.
+        // SAFETY: no other thread exists yet.
         unsafe { std::env::set_var("NUBIS_SHADERS", concat!(env!("CARGO_MANIFEST_DIR"), "/../../shaders/wgsl")) };
     }
     match run(Arguments::parse()) {
@@ -84,30 +86,34 @@ fn run(arguments: Arguments) -> Result<()> {
     let gpu = Gpu::open(arguments.adapter.as_deref())?;
     let (instance, adapter, device, queue) = gpu.shared();
     let setup = WgpuSetup::Existing(WgpuSetupExisting { instance, adapter, device, queue });
-    let options = eframe::NativeOptions {
+    let native_options = eframe::NativeOptions {
         viewport: ViewportBuilder::default()
             .with_title("nubis")
             .with_inner_size(arguments.size)
             .with_drag_and_drop(true),
         wgpu_options: WgpuConfiguration { wgpu_setup: setup, ..Default::default() },
-        // The picture has its own noise; a processor that draws the window has better to do.
+        // egui's dithering is redundant because rendered frames are dithered already; it is costly on a CPU adapter.
         dithering: false,
         ..Default::default()
     };
-    let start = Start {
+    let options = Options {
         scene: arguments.scene,
         adapter: arguments.adapter,
         frames: arguments.frames,
         screenshot: arguments.screenshot,
-        rate: arguments.rate,
+        target_frame_rate: arguments.rate,
         fly: arguments.fly,
-        failed: Arc::default(),
+        failure: Arc::default(),
     };
-    let failed = start.failed.clone();
-    eframe::run_native("nubis", options, Box::new(|context| Ok(Box::new(App::new(&context.egui_ctx, gpu, start)?))))
-        .map_err(|error| anyhow!("{error}"))?;
-    match failed.get() {
-        Some(why) => bail!("{why}"),
+    let failure = options.failure.clone();
+    eframe::run_native(
+        "nubis",
+        native_options,
+        Box::new(|context| Ok(Box::new(App::new(&context.egui_ctx, gpu, options)?))),
+    )
+    .map_err(|error| anyhow!("{error}"))?;
+    match failure.get() {
+        Some(reason) => bail!("{reason}"),
         None => Ok(()),
     }
 }

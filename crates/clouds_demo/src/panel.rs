@@ -1,32 +1,32 @@
-//! Sliders made from the one definition of the parameters: unit, range, what it is, and the way back to the default.
+//! Editors generated from the parameter schema: value with unit and range, documentation, and reset to the default.
 
 use clouds_core::params::{Params, Quality};
 use clouds_core::schema::{Block, Field, Type, Value, assign};
 use eframe::egui::{self, Color32, Response, RichText, Slider, Ui, WidgetText};
 
-/// Ranges wider than this are in decades.
-const WIDE: f64 = 300.0;
-/// Points of the column of names in a panel.
-const NAMES: f32 = 128.0;
-/// Points of a slider beside it: with its number and its unit they fill the panel.
-const SLIDER: f32 = 90.0;
+/// Ratio of a range's ends above which its slider is logarithmic.
+const LOGARITHMIC_RATIO: f64 = 300.0;
+/// Width of the label column, points.
+const LABEL_WIDTH: f32 = 128.0;
+/// Width of a slider without its number, points: label, slider, number and unit fill the panel.
+const SLIDER_WIDTH: f32 = 90.0;
 
-/// A name, and its widget after it.
+/// Label followed by its widget.
 pub fn labelled(ui: &mut Ui, name: &str, widget: impl FnOnce(&mut Ui) -> Response) -> Response {
     let label = ui.label(name);
     widget(ui).labelled_by(label.id)
 }
 
-/// A row of a panel: names in a column, and their widgets after them.
-pub fn field(ui: &mut Ui, name: impl Into<WidgetText>, widget: impl FnOnce(&mut Ui) -> Response) -> Response {
+/// Row of a panel: label in the label column, followed by its widget.
+pub fn labelled_row(ui: &mut Ui, name: impl Into<WidgetText>, widget: impl FnOnce(&mut Ui) -> Response) -> Response {
     ui.horizontal(|ui| {
-        let label = column(ui, name);
+        let label = column_label(ui, name);
         widget(ui).labelled_by(label.id)
     })
     .inner
 }
 
-/// A menu after its name, with room for all choices.
+/// Menu with a label, tall enough for all choices.
 pub fn menu(ui: &mut Ui, name: &str, chosen: &str, choices: impl FnOnce(&mut Ui)) {
     labelled(ui, name, |ui| {
         let menu = egui::ComboBox::from_id_salt(name).selected_text(chosen).height(400.0);
@@ -34,70 +34,70 @@ pub fn menu(ui: &mut Ui, name: &str, chosen: &str, choices: impl FnOnce(&mut Ui)
     });
 }
 
-/// A name in the column of names.
-fn column(ui: &mut Ui, name: impl Into<WidgetText>) -> Response {
-    ui.spacing_mut().slider_width = SLIDER;
-    let size = egui::vec2(NAMES, ui.spacing().interact_size.y);
+/// Label in the label column.
+fn column_label(ui: &mut Ui, name: impl Into<WidgetText>) -> Response {
+    ui.spacing_mut().slider_width = SLIDER_WIDTH;
+    let size = egui::vec2(LABEL_WIDTH, ui.spacing().interact_size.y);
     let layout = egui::Layout::left_to_right(egui::Align::Center);
-    let place = ui.allocate_ui_with_layout(size, layout, |ui| {
-        ui.set_min_width(NAMES);
+    let cell = ui.allocate_ui_with_layout(size, layout, |ui| {
+        ui.set_min_width(LABEL_WIDTH);
         ui.add(egui::Label::new(name).truncate())
     });
-    place.inner
+    cell.inner
 }
 
-/// What the user has asked for in a panel.
+/// State of the parameter panel.
 #[derive(Default)]
 pub struct Panel {
-    /// Only fields whose name or text has this.
+    /// Filter on the names and documentation of the fields.
     pub search: String,
-    /// Why the last change was refused.
-    pub refused: Option<String>,
+    /// Error that rejected the last change.
+    pub error: Option<String>,
 }
 
 impl Panel {
-    /// All groups of a sky; says whether it was changed.
+    /// Editors of all sky parameters; returns whether a value changed.
     pub fn sky(&mut self, ui: &mut Ui, params: &mut Params) -> bool {
         let mut next = params.clone();
-        let usual = Params::default();
+        let default = Params::default();
         let mut changed = false;
-        for ((name, block), (_, usual)) in next.blocks_mut().into_iter().zip(usual.blocks()) {
-            changed |= self.block(ui, name, block, usual);
+        for ((name, block), (_, default)) in next.blocks_mut().into_iter().zip(default.blocks()) {
+            changed |= self.block(ui, name, block, default);
         }
         changed && self.accept(next.check().map(|()| next), params)
     }
 
-    /// The fields of a method; says whether it was changed.
-    pub fn quality(&mut self, ui: &mut Ui, quality: &mut Quality, usual: &Quality) -> bool {
+    /// Editors of the quality; returns whether a value changed.
+    pub fn quality(&mut self, ui: &mut Ui, quality: &mut Quality, default: &Quality) -> bool {
         let mut next = quality.clone();
-        self.block(ui, "quality", &mut next, usual) && self.accept(next.check().map(|()| next), quality)
+        self.block(ui, "quality", &mut next, default) && self.accept(next.check().map(|()| next), quality)
     }
 
-    /// Takes what is allowed, and says why not what is not.
+    /// Applies a valid change; keeps the error of an invalid one.
     fn accept<T>(&mut self, next: clouds_core::Result<T>, current: &mut T) -> bool {
         match next {
             Ok(next) => {
                 *current = next;
-                self.refused = None;
+                self.error = None;
                 true
             }
             Err(error) => {
-                self.refused = Some(error.to_string());
+                self.error = Some(error.to_string());
                 false
             }
         }
     }
 
-    fn block(&self, ui: &mut Ui, name: &str, block: &mut dyn Block, usual: &dyn Block) -> bool {
+    fn block(&self, ui: &mut Ui, name: &str, block: &mut dyn Block, default: &dyn Block) -> bool {
         let search = self.search.trim().to_lowercase();
-        let wanted = |field: &Field| {
-            // What follows from the winds of before is no matter of sliders.
+        let is_visible = |field: &Field| {
+            // Exact fields hold accumulated wind drift and have no slider.
             if matches!(field.ty, Type::Exact(_)) {
                 return false;
             }
             search.is_empty() || format!("{name}.{} {}", field.name, field.doc).to_lowercase().contains(&search)
         };
-        let fields: Vec<_> = block.fields().iter().enumerate().filter(|(_, field)| wanted(field)).collect();
+        let fields: Vec<_> = block.fields().iter().enumerate().filter(|(_, field)| is_visible(field)).collect();
         if fields.is_empty() {
             return false;
         }
@@ -108,9 +108,9 @@ impl Panel {
             for (index, field) in fields {
                 let before = block.get(index);
                 let mut value = before.clone();
-                row(ui, name, field, &mut value, &usual.get(index));
+                row(ui, name, field, &mut value, &default.get(index));
                 if value != before {
-                    // A slider stays within the range that is checked.
+                    // `assign` accepts every value in the range of the slider.
                     changed |= assign(block, name, field.name, &value).is_ok();
                 }
             }
@@ -119,17 +119,18 @@ impl Panel {
     }
 }
 
-fn row(ui: &mut Ui, block: &str, field: &Field, value: &mut Value, usual: &Value) {
+fn row(ui: &mut Ui, block: &str, field: &Field, value: &mut Value, default: &Value) {
     let hover = |response: egui::Response| {
         let unit = if field.unit.is_empty() { String::new() } else { format!("\n[{}]", field.unit) };
         response.on_hover_text(format!("{block}.{}\n{}{unit}\n{}", field.name, field.doc.trim(), field.allowed()))
     };
     ui.horizontal(|ui| {
         let name = field.name.replace('_', " ");
-        let label = hover(column(ui, if value == usual { RichText::new(name) } else { RichText::new(name).strong() }));
-        let back = ui.add_enabled(value != usual, egui::Button::new("×").small());
-        if back.on_hover_text(format!("back to {usual}")).clicked() {
-            *value = usual.clone();
+        let label =
+            hover(column_label(ui, if value == default { RichText::new(name) } else { RichText::new(name).strong() }));
+        let reset = ui.add_enabled(value != default, egui::Button::new("×").small());
+        if reset.on_hover_text(format!("back to {default}")).clicked() {
+            *value = default.clone();
         }
         hover(widget(ui, field, value).labelled_by(label.id));
     });
@@ -138,12 +139,14 @@ fn row(ui: &mut Ui, block: &str, field: &Field, value: &mut Value, usual: &Value
 fn widget(ui: &mut Ui, field: &Field, value: &mut Value) -> egui::Response {
     let (min, max) = field.range;
     let suffix = if field.unit.is_empty() { String::new() } else { format!(" {}", field.unit) };
-    let wide = min >= 0.0 && max > WIDE * min.max(1.0);
+    let logarithmic = min >= 0.0 && max > LOGARITHMIC_RATIO * min.max(1.0);
     match (field.ty, value) {
         (Type::F32, Value::Float(v)) => {
-            ui.add(Slider::new(v, min..=max).logarithmic(wide).suffix(suffix).max_decimals(6))
+            ui.add(Slider::new(v, min..=max).logarithmic(logarithmic).suffix(suffix).max_decimals(6))
         }
-        (Type::U32, Value::Int(v)) => ui.add(Slider::new(v, min as i64..=max as i64).logarithmic(wide).suffix(suffix)),
+        (Type::U32, Value::Int(v)) => {
+            ui.add(Slider::new(v, min as i64..=max as i64).logarithmic(logarithmic).suffix(suffix))
+        }
         (Type::Bool, Value::Bool(v)) => ui.checkbox(v, ""),
         (Type::Choice(names), Value::Text(v)) => {
             let combo = egui::ComboBox::from_id_salt(field.name).selected_text(v.clone());

@@ -1,4 +1,4 @@
-//! Skies as text: the TOML files of `Params.save`, and the Python lines that make a picture.
+//! Text formats of the sky parameters: the TOML files of `Params.save`, and Python code that renders the view.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -11,10 +11,10 @@ use clouds_core::{Camera, DensityGrid};
 use glam::DVec3;
 use toml::{Table, Value as Toml};
 
-/// The scenes of the Python package, as `python -m nubis scenes` writes them; tests/test_demo.py compares.
+/// Scenes of the Python package; tests/test_demo.py compares them and regenerates the file with `UPDATE=1`.
 const SCENES: &str = include_str!("scenes.toml");
 
-/// Skies to start from: name, camera, parameters.
+/// Named scenes with camera and parameters.
 pub fn scenes() -> Result<Vec<(String, Camera, Params)>> {
     let table: Table = SCENES.parse()?;
     table.into_iter().map(|(name, scene)| scene_from(name, scene)).collect()
@@ -35,19 +35,19 @@ fn scene_from(name: String, scene: Toml) -> Result<(String, Camera, Params)> {
     Ok((name, camera, params_from(scene)?))
 }
 
-/// Reads a TOML file; fields left out have their defaults.
+/// Parameters from a TOML file; omitted fields have their defaults.
 pub fn load(path: &Path) -> Result<Params> {
     let text = std::fs::read_to_string(path).with_context(|| format!("{} cannot be read", path.display()))?;
-    // Editors on Windows begin files with a mark.
+    // Some Windows editors write a byte-order mark.
     let text = text.trim_start_matches('\u{feff}');
     let table: Table = text.parse().with_context(|| format!("{} is no TOML file", path.display()))?;
-    let table = with_arrays(Toml::Table(table), path.parent().unwrap_or(Path::new("")))?;
-    let Toml::Table(table) = table else { unreachable!("a table stays one") };
+    let table = inline_arrays(Toml::Table(table), path.parent().unwrap_or(Path::new("")))?;
+    let Toml::Table(table) = table else { unreachable!("`inline_arrays` returns a table for a table") };
     params_from(table).with_context(|| format!("{} is no sky", path.display()))
 }
 
-/// What Python has saved beside the file (`name.npy`) in its place.
-fn with_arrays(value: Toml, folder: &Path) -> Result<Toml> {
+/// Value with the names of `.npy` files replaced by the arrays in them; Python saves arrays beside the TOML file.
+fn inline_arrays(value: Toml, folder: &Path) -> Result<Toml> {
     fn nested(shape: &[usize], data: &[f32]) -> Toml {
         match shape {
             [] => Toml::Float(f64::from(data[0])),
@@ -63,10 +63,10 @@ fn with_arrays(value: Toml, folder: &Path) -> Result<Toml> {
             nested(&shape, &data)
         }
         Toml::Array(parts) if parts.iter().any(Toml::is_table) => {
-            Toml::Array(parts.into_iter().map(|part| with_arrays(part, folder)).collect::<Result<_>>()?)
+            Toml::Array(parts.into_iter().map(|part| inline_arrays(part, folder)).collect::<Result<_>>()?)
         }
         Toml::Table(fields) => {
-            let fields = fields.into_iter().map(|(name, field)| Ok((name, with_arrays(field, folder)?)));
+            let fields = fields.into_iter().map(|(name, field)| Ok((name, inline_arrays(field, folder)?)));
             Toml::Table(fields.collect::<Result<_>>()?)
         }
         other => other,
@@ -137,7 +137,7 @@ fn number(given: &Toml) -> Option<f64> {
     given.as_float().or_else(|| given.as_integer().map(|v| v as f64))
 }
 
-/// The numbers of nested arrays of so many dimensions, and their shape.
+/// Shape and elements of a nested array of `dimensions` dimensions.
 fn numbers(given: &Toml, dimensions: usize) -> Result<(Vec<usize>, Vec<f64>)> {
     let Toml::Array(entries) = given else { bail!("{given} must be an array") };
     if dimensions == 1 {
@@ -166,11 +166,11 @@ fn value(given: &Toml) -> Result<Value> {
             Value::Map(Arc::new(Map { width: shape[1], height: shape[0], channels, data }))
         }
         Toml::Array(_) => Value::Vector(numbers(given, 1)?.1),
-        Toml::Datetime(_) | Toml::Table(_) => bail!("{given} must be a number, a word, a switch or an array"),
+        Toml::Datetime(_) | Toml::Table(_) => bail!("{given} must be a number, a string, a boolean or an array"),
     })
 }
 
-/// Writes all parameters to a TOML file that the Python package reads too.
+/// Writes all parameters to a TOML file, which the Python package can read.
 pub fn save(path: &Path, params: &Params) -> Result<()> {
     Ok(clouds_core::files::write_bytes(path, to_toml(params)?.as_bytes())?)
 }
@@ -226,32 +226,33 @@ fn nested(map: &Map) -> Toml {
     Toml::Array(map.data.chunks(map.width * map.channels).map(row).collect())
 }
 
-/// A picture of a sky, in words.
-pub struct Shot<'a> {
-    /// From where.
+/// Arguments of the Python code that renders a view.
+pub struct PythonCall<'a> {
+    /// Camera.
     pub camera: &'a Camera,
-    /// The sky.
+    /// Sky parameters.
     pub params: &'a Params,
-    /// Its time, s.
+    /// Animation time, s.
     pub time: f64,
-    /// The name of the method.
+    /// Name of the quality.
     pub quality: &'a str,
-    /// Width and height.
+    /// Width and height, pixels.
     pub size: [u32; 2],
-    /// Stops.
+    /// Exposure, stops.
     pub exposure: f32,
-    /// One of [`clouds_core::color::TONE_MAPS`].
+    /// Tone map, one of [`clouds_core::color::TONE_MAPS`].
     pub tone_map: &'a str,
 }
 
-/// The Python lines that make the same picture. A map, a mixture or a grid is no line: then the sky comes from a TOML file,
-/// whose name is given.
-pub fn python(shot: &Shot<'_>, sky: Option<&str>) -> String {
+/// Python code that renders the view.
+///
+/// Parameters that have no Python literal come from a TOML file ([`needs_file`]), whose name is `params_file`.
+pub fn python_code(call: &PythonCall<'_>, params_file: Option<&str>) -> String {
     let mut code = String::from("import nubis\n\n");
-    if let Some(path) = sky {
+    if let Some(path) = params_file {
         let _ = writeln!(code, "params = nubis.Params.load({path:?})");
     } else {
-        let changes = changes(shot.params);
+        let changes = changes(call.params);
         if changes.is_empty() {
             code += "params = nubis.Params()\n";
         } else {
@@ -262,7 +263,7 @@ pub fn python(shot: &Shot<'_>, sky: Option<&str>) -> String {
             code += "    }\n)\n";
         }
     }
-    let Camera { eye, forward, up, fov, .. } = shot.camera;
+    let Camera { eye, forward, up, fov, .. } = call.camera;
     let target = *eye + *forward;
     let tuple = |v: DVec3| format!("({:?}, {:?}, {:?})", v.x, v.y, v.z);
     let _ = writeln!(
@@ -272,31 +273,33 @@ pub fn python(shot: &Shot<'_>, sky: Option<&str>) -> String {
         tuple(target),
         tuple(*up)
     );
-    let [width, height] = shot.size;
-    let Shot { time, quality, exposure, tone_map, .. } = shot;
+    let [width, height] = call.size;
+    let PythonCall { time, quality, exposure, tone_map, .. } = call;
     let _ = writeln!(code, "renderer = nubis.Renderer({width}, {height}, quality=\"{quality}\")");
     let _ = writeln!(code, "frame = renderer.render(camera, params, time={time:?})");
     let _ = writeln!(code, "nubis.save(\"sky.png\", frame, exposure={exposure:?}, tonemap=\"{tone_map}\")");
     code
 }
 
-/// Whether a sky cannot be said in lines.
+/// Whether parameters have no Python literal: maps, mixtures and density grids.
 pub fn needs_file(params: &Params) -> bool {
-    let maps = |block: &dyn Block| {
+    let has_map = |block: &dyn Block| {
         let fields = block.fields().iter().enumerate();
         fields.filter(|(_, f)| matches!(f.ty, Type::Map(_))).any(|(i, _)| block.get(i) != Value::None)
     };
-    params.volume.is_some() || !params.weather_mix.is_empty() || params.blocks().iter().any(|(_, block)| maps(*block))
+    params.volume.is_some()
+        || !params.weather_mix.is_empty()
+        || params.blocks().iter().any(|(_, block)| has_map(*block))
 }
 
-/// The fields that are not at their defaults: path, and the value in Python.
+/// Fields that differ from their defaults: path and Python literal.
 fn changes(params: &Params) -> Vec<(String, String)> {
-    let usual = Params::default();
+    let default = Params::default();
     let mut changes = Vec::new();
-    for ((name, block), (_, usual)) in params.blocks().iter().zip(usual.blocks()) {
+    for ((name, block), (_, default)) in params.blocks().iter().zip(default.blocks()) {
         for (index, field) in block.fields().iter().enumerate() {
             let value = block.get(index);
-            if value != usual.get(index) {
+            if value != default.get(index) {
                 changes.push((format!("{name}.{}", field.name), python_value(&value)));
             }
         }
@@ -323,14 +326,14 @@ mod tests {
     }
 
     #[test]
-    fn scenes_are_skies() {
-        let scenes = scenes().expect("are read");
+    fn scenes_are_valid() {
+        let scenes = scenes().expect("scenes are valid");
         assert!(scenes.iter().any(|(name, ..)| name == "fair_weather"));
         assert!(scenes.len() > 8);
     }
 
     #[test]
-    fn what_is_saved_comes_back() {
+    fn saved_parameters_round_trip() {
         let mut params = Params::default();
         params.clouds.coverage = 0.7;
         params.sun.irradiance = [1.0, 2.5, 3.0];
@@ -345,7 +348,7 @@ mod tests {
     }
 
     #[test]
-    fn wrong_files_are_refused_by_name() {
+    fn invalid_files_are_rejected_by_field() {
         for (text, named) in [
             ("[clouds]\ncoverage = 2.0", "clouds.coverage = 2"),
             ("[clouds]\ncovrage = 0.5", "clouds.covrage"),
@@ -360,11 +363,11 @@ mod tests {
     }
 
     #[test]
-    fn python_says_what_was_changed() {
-        let (_, camera, mut params) = scenes().expect("are read").remove(0);
+    fn python_code_has_the_changed_fields() {
+        let (_, camera, mut params) = scenes().expect("scenes are valid").remove(0);
         params.clouds.coverage = 0.7;
         params.light.model = clouds_core::params::Model::Vsu2022;
-        let shot = Shot {
+        let call = PythonCall {
             camera: &camera,
             params: &params,
             time: 3.0,
@@ -373,7 +376,7 @@ mod tests {
             exposure: 0.5,
             tone_map: "agx",
         };
-        let code = python(&shot, None);
+        let code = python_code(&call, None);
         assert!(code.contains("\"clouds.coverage\": 0.7,") && code.contains("\"light.model\": \"vsu2022\","), "{code}");
         assert!(!code.contains("clouds.base"), "{code}");
     }

@@ -1,9 +1,9 @@
-//! What a screen shows.
+//! Readback of screens.
 
 use clouds_core::{Gpu, Screen, wgpu};
 
-/// Four bytes a pixel, row by row.
-pub fn bytes(gpu: &Gpu, screen: &Screen) -> Vec<u8> {
+/// RGBA8 pixels of a screen, row by row.
+pub fn pixels(gpu: &Gpu, screen: &Screen) -> Vec<u8> {
     let (_, _, device, queue) = gpu.shared();
     let texture = screen.view().texture();
     let [width, height] = screen.size();

@@ -1,4 +1,4 @@
-"""Time and error of methods: one row of results for each scene and method."""
+"""Measurement of methods: one row of times and errors per scene and method."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import os
 import platform
 from collections.abc import Iterable
 from datetime import UTC, datetime
+from pathlib import Path
 from time import perf_counter, process_time
 from typing import Any
 
@@ -24,7 +25,7 @@ Row = dict[str, Any]
 def timed(
     renderer: nubis.Renderer, camera: nubis.Camera, params: nubis.Params, repeats: int
 ) -> tuple[Row, Layers]:
-    """Render once to bake, compile and see the layers, then `repeats` times by the clock."""
+    """Times of `repeats` renders, after one warm-up for bakes, compilation and the layers."""
     started = perf_counter()
     layers = renderer.render_layers(camera, params)
     first = perf_counter() - started
@@ -39,14 +40,14 @@ def timed(
         "seconds": median,
         "seconds_p95": float(np.percentile(seconds, 95)),
         "setup_seconds": first - median,
-        # Of all threads: on a software adapter this is what others on the machine do not disturb.
+        # CPU time of all threads: on a software adapter it is independent of the machine's load.
         "processor_seconds": float(np.median(processor)),
     }
     return times, layers
 
 
 def measure(scenes: Iterable[str], methods: list[Method], size: Size, repeats: int) -> list[Row]:
-    """Return a row for each scene and method; methods that are the same are measured once."""
+    """Return a row per scene and method. Identical methods are measured once."""
     rows = []
     for scene in tqdm(scenes, unit="scene", disable=None):
         truth = reference.reference_layers(scene, size)
@@ -89,7 +90,7 @@ def _measure(scene: str, method: Method, truth: Layers, size: Size, repeats: int
 
 
 def header(command: list[str]) -> Row:
-    """On what the numbers were measured."""
+    """Machine, adapter, version and command of a measurement."""
     return {
         "version": nubis.__version__,
         "shaders": reference.shader_hash(),
@@ -102,13 +103,22 @@ def header(command: list[str]) -> Row:
     }
 
 
+def resident_memory() -> float:
+    """MiB of memory that the process holds; NaN where there is no /proc."""
+    try:
+        pages = int(Path("/proc/self/statm").read_text().split()[1])
+    except OSError:
+        return float("nan")
+    return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
+
+
 def marched() -> list[str]:
-    """The scenes in which there is anything to march."""
+    """Names of the scenes with volumetric clouds."""
     return [name for name, (_, params) in nubis.scenes.items() if params.clouds.coverage > 0]
 
 
 def seeds(scenes: Iterable[str]) -> dict[str, dict[str, int]]:
-    """The random seeds of the scenes' skies."""
+    """Random seeds of the scenes."""
     blocks = "clouds", "weather", "high_clouds"
     return {s: {b: getattr(nubis.scenes[s][1], b).seed for b in blocks} for s in scenes}
 

@@ -1,9 +1,9 @@
-"""A long run: thousands of animated frames, watched for growth, for drift and for broken numbers.
+"""Soak test: thousands of animated frames, checked for memory growth, drift and non-finite values.
 
     python -m benchmarks.soak --frames 10000
 
-The camera flies and turns, wind blows, sun and clouds change with every frame, and now and then a
-cut changes place, time, seeds, light and projection at once.
+Camera, wind, sun and clouds change with every frame. Cuts change place, time, seeds, light model
+and projection.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ from __future__ import annotations
 import argparse
 import json
 import multiprocessing
-import os
 import shlex
 import sys
 import warnings
@@ -29,23 +28,23 @@ from benchmarks import measure
 
 RESULTS = Path(__file__).parent / "results"
 SIZE = 64, 36
-#: Frames of a shot; a cut comes after it.
+#: Frames between two cuts.
 SHOT = 250
-#: Frames between two readings of the memory.
+#: Frames between two readings of memory.
 READING = 50
-#: How long the last picture is held still.
+#: Number of repeats of the last shot.
 HELD = 64
 
 Shot = tuple[nubis.Camera, nubis.Params, float]
 
 
 def shot(i: int) -> Shot:
-    """The i-th frame of the run, known without those before it so that it can be made afresh."""
+    """The i-th shot of the run. It depends on `i` alone, so that it can be reproduced."""
     scene, since = divmod(i, SHOT)
     rng = np.random.default_rng(scene)
     _, params = list(nubis.scenes.values())[scene % len(nubis.scenes)]
     swing = sin(2 * pi * since / SHOT)
-    # The sky is baked anew where sun or altitude change, which takes longer than a small picture.
+    # A change of sun or altitude rebakes the sky LUTs, which costs more than a small picture.
     bend = swing if scene % 4 == 0 else 0.0
     params = params.with_(
         **{
@@ -55,12 +54,12 @@ def shot(i: int) -> Shot:
             "weather.seed": int(rng.integers(2**32)),
             "sun.elevation": float(rng.uniform(-5, 60)) + 3 * bend,
             "wind.direction": float(rng.uniform(0, 360)),
-            "high_clouds.texture_size": 64,  # 512 texels take ten times as long as the picture
+            "high_clouds.texture_size": 64,  # a bake of 512 costs ten times as much as the picture
             "light.model": ("thesis2018", "single", "nubis2015", "vsu2022")[scene % 4],
         }
     )
     x, y = rng.uniform(-1e5, 1e5, 2)
-    # From below the clouds, inside and above them.
+    # Altitudes below, inside and above the clouds.
     eye = np.array([x, y + 10.0 * since, rng.uniform(100, 5000) + 200 * bend])
     azimuth = rng.uniform(0, 2 * pi) + 0.004 * since
     ahead = np.array([sin(azimuth), cos(azimuth), 0.15 * swing])
@@ -71,7 +70,7 @@ def shot(i: int) -> Shot:
 
 
 def run(frames: int) -> dict[str, Any]:
-    """Render the frames; return what was seen."""
+    """Render the frames; return statistics."""
     renderer = nubis.Renderer(*SIZE, quality="draft")
     memory: list[tuple[int, float]] = []
     low, high, broken = np.inf, 0.0, 0
@@ -87,9 +86,9 @@ def run(frames: int) -> dict[str, Any]:
         broken += not np.isfinite(frame).all()
         low, high = min(low, float(frame.min())), max(high, float(frame[..., :3].max()))
         if i % READING == 0:
-            memory.append((i, _resident()))
+            memory.append((i, measure.resident_memory()))
         if i < frames and i % SHOT == 0:
-            # After a cut a frame is a still: one of another renderer that has no past.
+            # A frame after a cut equals the still of a new renderer, without history.
             fresh = nubis.Renderer(*SIZE, quality="draft")
             camera, params, time = shot(i)
             compared += 1
@@ -102,7 +101,7 @@ def run(frames: int) -> dict[str, Any]:
     held = np.sqrt(np.mean((frame - still)[..., :3] ** 2)) / still[..., :3].mean()
     with multiprocessing.get_context("spawn").Pool(1) as pool:
         afresh = pool.apply(_afresh, last)
-    # The first shots fill caches; growth is what comes after half of the run.
+    # The first shots fill caches: growth is measured over the second half of the run.
     index, mib = np.array(memory[len(memory) // 2 :]).T
     return {
         "frames": frames,
@@ -124,7 +123,7 @@ def run(frames: int) -> dict[str, Any]:
 
 
 def faults(found: dict[str, Any]) -> list[str]:
-    """What is wrong with a run, in words."""
+    """Descriptions of the failed checks of a run."""
     checks = {
         "a frame is not finite": not found["broken_frames"],
         "radiance is negative": found["lowest"] >= 0,
@@ -143,17 +142,8 @@ def _afresh(camera: nubis.Camera, params: nubis.Params, time: float) -> bytes:
     return renderer.render(camera, params, time=time).tobytes()
 
 
-def _resident() -> float:
-    """MiB of memory that the process holds; NaN where there is no /proc."""
-    try:
-        pages = int(Path("/proc/self/statm").read_text().split()[1])
-    except OSError:
-        return float("nan")
-    return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run, print and write; return 1 when something is wrong."""
+    """Run, print and write the results; return 1 if a check fails."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.soak", description="A long run.")
     parser.add_argument("--frames", type=int, default=10_000, help="default: 10000")
     parser.add_argument("--out", type=Path, default=RESULTS / "soak.json", metavar="FILE")

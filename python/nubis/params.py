@@ -18,17 +18,19 @@ from nubis._sun import SunBlock
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Sun(SunBlock):
-    """The sun.
+    """Position, irradiance and disc of the sun.
 
     Attributes
     ----------
     elevation : float
-        Height above the horizon. Allowed: a number from -90 to 90 degrees.
+        Elevation above the horizon, geometric (without refraction). Allowed: a number from -90 to
+        90 degrees.
     azimuth : float
-        Compass direction, clockwise from north. Allowed: a number from -360 to 360 degrees.
+        Azimuth, clockwise from north. Allowed: a number from -360 to 360 degrees.
     irradiance : tuple[float, float, float]
-        Irradiance on a plane that faces the sun, above the atmosphere (linear Rec. 709). Allowed: 3
-        numbers from 0 to 1000000.
+        Irradiance above the atmosphere on a plane that faces the sun (linear, Rec. 709 primaries).
+        Its unit, per steradian, is the unit of the picture (docs/units.md). Allowed: 3 numbers from
+        0 to 1000000.
     visible : bool
         Whether the sun's disc is drawn. Allowed: True or False.
     """
@@ -41,25 +43,25 @@ class Sun(SunBlock):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Moon(Block):
-    """The moon. It lights air, clouds and ground as the sun does, casts shadows, and shines
-    together with it. Its bright side is toward the sun.
+    """Position, phase, irradiance and disc of the moon. Moonlight is added to sunlight: it lights
+    air, clouds and ground, and casts shadows. The lit side of the disc faces the sun.
 
     Attributes
     ----------
     elevation : float
-        Height above the horizon; at -90, the default, there is none. Allowed: a number from -90 to
-        90 degrees.
+        Elevation above the horizon. -90, the default, switches the moon off. Allowed: a number from
+        -90 to 90 degrees.
     azimuth : float
-        Compass direction, clockwise from north. Allowed: a number from -360 to 360 degrees.
+        Azimuth, clockwise from north. Allowed: a number from -360 to 360 degrees.
     phase : float
-        Age as a share of a month: 0 is new, 0.25 half, 0.5 full, 0.75 half again and 1 new. A half
-        moon has a tenth of the light of a full one (Krisciunas and Schaefer 1991). Allowed: a
-        number from 0 to 1.
+        Age as a fraction of the lunar month: 0 is new moon, 0.25 first quarter, 0.5 full moon, 0.75
+        last quarter, 1 new moon. The irradiance of a half moon is a tenth of that of a full moon
+        (Krisciunas and Schaefer 1991). Allowed: a number from 0 to 1.
     irradiance : tuple[float, float, float]
-        Irradiance of the full moon on a plane that faces it, above the air, in the unit of
-        `sun.irradiance`. The default is as much less than a sun of 10 as the magnitude of -12.73 is
-        than -26.74, and as much redder as B - V = 0.92 is than 0.65 (Allen's Astrophysical
-        Quantities). Allowed: 3 numbers from 0 to 1000000.
+        Irradiance of the full moon above the atmosphere on a plane that faces the moon, in the unit
+        of `sun.irradiance`. The default corresponds to a sun of 10: its brightness follows from
+        apparent magnitudes of -12.73 (moon) and -26.74 (sun), its colour from B - V of 0.92 (moon)
+        and 0.65 (sun; Allen's Astrophysical Quantities). Allowed: 3 numbers from 0 to 1000000.
     visible : bool
         Whether the moon's disc is drawn. Allowed: True or False.
     """
@@ -73,66 +75,77 @@ class Moon(Block):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Clouds(Block):
-    """The volumetric clouds: where they are and what they are made of.
+    """The volumetric clouds (lower deck): cover, type, altitude, density and noises.
 
     Attributes
     ----------
     coverage : float
-        How much of the sky is cloudy: shifts the weather map's coverage, 0 is clear, 0.5 the map as
-        it is, 1 overcast. Allowed: a number from 0 to 1.
+        Cloud cover: an offset of `2 * coverage - 1` to the coverage of the weather map. 0 is a
+        clear sky, 0.5 leaves the map unchanged, 1 is overcast. Allowed: a number from 0 to 1.
     type : float
-        Cloud type: 0 stratus, 0.5 stratocumulus, 1 cumulus. Shifts the weather map's type, 0.5 the
-        map as it is. Allowed: a number from 0 to 1.
+        Cloud type: an offset of `2 * type - 1` to the type of the weather map, in which 0 is
+        stratus, 0.5 stratocumulus and 1 cumulus. 0.5 leaves the map unchanged. Allowed: a number
+        from 0 to 1.
     precipitation : float
-        Rain: thickens and darkens the clouds and lets them grow to cumulonimbus (nubis2015). Scales
-        the weather map's precipitation, 0 is dry. Allowed: a number from 0 to 1.
+        Precipitation: a factor on the precipitation of the weather map; 0 is dry. Precipitation
+        thickens and darkens clouds and makes cumulus grow into cumulonimbus (nubis2015). Allowed: a
+        number from 0 to 1.
     base : float
         Altitude of the cloud base. Allowed: a number from 0 to 20000 m.
     top : float
-        Altitude of the highest cloud tops where there is no rain. Allowed: a number from 1 to 25000
+        Altitude of the highest cloud tops without precipitation. Allowed: a number from 1 to 25000
         m.
     cumulonimbus_top : float
         Altitude of the tops of cumulonimbus, where precipitation is 1 (nubis2015: 8 km). Allowed: a
         number from 1 to 25000 m.
     anvil : float
-        How far the tops of cumulonimbus spread. Allowed: a number from 0 to 1.
+        Horizontal extent of the anvils at the tops of cumulonimbus. Allowed: a number from 0 to 1.
     rain_extinction : float
-        Extinction of the rain that is seen below the clouds where it is heaviest; 0 hides it. What
-        is thinner than clean air (1e-5) evaporates before it reaches the ground. Allowed: a number
-        from 0 to 1 1/m.
+        Extinction of the rain below the clouds at the heaviest precipitation; 0 hides the rain.
+        Rain with less extinction than clean air (1e-5) evaporates before it reaches the ground.
+        Allowed: a number from 0 to 1 1/m.
     extinction : float
-        Extinction where the density is 1. Allowed: a number from 0 to 100000000 1/m.
+        Extinction at density 1. Allowed: a number from 0 to 100000000 1/m.
     seed : int
-        Which random shapes. Allowed: a whole number from 0 to 4294967295.
+        Random seed of the noises. Allowed: a whole number from 0 to 4294967295.
     noise : {nubis2015, vsu2022}
-        Which noises the shapes are made of. Allowed: one of "nubis2015", "vsu2022".
+        Noises of base shape and detail. `nubis2015`: Perlin-Worley noise and three octaves of
+        Worley FBM for the base shape, Worley FBM for the detail. `vsu2022`: Perlin-Worley noise of
+        rising frequency in every channel. Allowed: one of "nubis2015", "vsu2022".
     shape_scale : float
-        Width of one tile of the base shape. Allowed: a number from 100 to 200000 m.
+        Tile width of the base-shape noise. Allowed: a number from 100 to 200000 m.
     detail_scale : float
-        Width of one tile of the detail that erodes the edges. Allowed: a number from 10 to 50000 m.
+        Tile width of the detail noise, which erodes the edges. Allowed: a number from 10 to 50000
+        m.
     detail : float
-        How deep the detail erodes the edges (nubis2015: 0.2). Allowed: a number from 0 to 1.
+        Depth of the erosion by the detail noise (nubis2015: 0.2). Allowed: a number from 0 to 1.
     fine_detail : float
-        How much of a finer detail, a fifth as wide, is added to it: what shows of clouds that are
-        near. 0 leaves it out (nubis2015). Allowed: a number from 0 to 1.
+        Weight of a finer detail noise, a fifth as wide, that is added to the detail noise. It is
+        visible in near clouds. 0 leaves it out (nubis2015). Allowed: a number from 0 to 1.
     curl_scale : float
-        Width of one tile of the curl noise that swirls the detail. Allowed: a number from 10 to
+        Tile width of the curl noise, which distorts the detail noise. Allowed: a number from 10 to
         50000 m.
     curl : float
-        How far curl noise displaces the detail at the base. Allowed: a number from 0 to 2000 m.
+        Displacement of the detail noise by the curl noise at the cloud base. It falls to 0 at the
+        cloud top. Allowed: a number from 0 to 2000 m.
     stratus : tuple[float, float, float, float]
-        Where the density of stratus rises from 0 to 1 and where it falls back, as fractions of its
-        height (nubis2015, figure 4.10; vsu2022's gradients). Allowed: 4 numbers from 0 to 1.
+        Height profile of stratus: the fractions of the height at which the density starts to rise
+        from 0, reaches 1, starts to fall, and reaches 0 (nubis2015, figure 4.10; vsu2022's
+        gradients). Allowed: 4 numbers from 0 to 1.
     stratocumulus : tuple[float, float, float, float]
-        The same for stratocumulus. Allowed: 4 numbers from 0 to 1.
+        Height profile of stratocumulus, as four fractions of the height in the order of `stratus`.
+        Allowed: 4 numbers from 0 to 1.
     cumulus : tuple[float, float, float, float]
-        The same for cumulus. Allowed: 4 numbers from 0 to 1.
+        Height profile of cumulus, as four fractions of the height in the order of `stratus`.
+        Allowed: 4 numbers from 0 to 1.
     cumulonimbus : tuple[float, float, float, float]
-        The same for cumulonimbus. Allowed: 4 numbers from 0 to 1.
+        Height profile of cumulonimbus, as four fractions of the height in the order of `stratus`.
+        Allowed: 4 numbers from 0 to 1.
     profile : array of float32, shape (H, W), or None
-        Density by height and type in place of the first three: row 0 at the tops, column 0 type 0
-        (Frostbite 2016). Allowed: None or a float array of shape (H, W), H and W from 1 to 8192,
-        values from 0 to 1.
+        Table of density by height and type that replaces `stratus`, `stratocumulus` and `cumulus`:
+        row 0 is the top of the clouds, the last row their base, column 0 type 0, the last column
+        type 1 (Frostbite 2016). Allowed: None or a float array of shape (H, W), H and W from 1 to
+        8192, values from 0 to 1.
     """
 
     coverage: float = 0.45
@@ -161,32 +174,34 @@ class Clouds(Block):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class UpperClouds(Block):
-    """A second deck of volumetric clouds, above the first. Its weather is another part of the same
-    map, and its noises are those of the first at another scale.
+    """The upper deck of volumetric clouds, above `clouds`. Its weather is another region of the
+    same weather map. Its noises are those of the lower deck at another scale.
 
     Attributes
     ----------
     coverage : float
-        How much of the sky it covers: as `clouds.coverage`; 0 is none. Allowed: a number from 0 to
-        1.
+        Cloud cover of the upper deck, in the scale of `clouds.coverage`; 0 switches the deck off.
+        Allowed: a number from 0 to 1.
     type : float
-        Cloud type: as `clouds.type`. Allowed: a number from 0 to 1.
+        Cloud type of the upper deck, in the scale of `clouds.type`. Allowed: a number from 0 to 1.
     base : float
-        Altitude of its base. Allowed: a number from 0 to 25000 m.
+        Altitude of the base of the upper deck: at or above `clouds.top` unless `coverage` is 0.
+        Allowed: a number from 0 to 25000 m.
     top : float
-        Altitude of its tops. Allowed: a number from 1 to 25000 m.
+        Altitude of the tops of the upper deck. Allowed: a number from 1 to 25000 m.
     extinction : float
-        Extinction where the density is 1. Allowed: a number from 0 to 100000000 1/m.
+        Extinction of the upper deck at density 1. Allowed: a number from 0 to 100000000 1/m.
     scale : float
-        Size of its clouds, as a share of the size of those below. Allowed: a number from 0.01 to
-        100.
+        Size of the clouds of the upper deck, as a factor on the size of those of the lower deck.
+        Allowed: a number from 0.01 to 100.
     direction : float
-        Compass direction toward which its wind blows, clockwise from north. Allowed: a number from
-        -360 to 360 degrees.
+        Compass direction toward which the upper deck drifts, clockwise from north. Allowed: a
+        number from -360 to 360 degrees.
     speed : float
-        Speed of that wind. Allowed: a number from -1000 to 1000 m/s.
+        Wind speed of the upper deck. Allowed: a number from -1000 to 1000 m/s.
     shear : float
-        How far its tops lean downwind. Allowed: a number from -20000 to 20000 m.
+        Downwind displacement of the tops of the upper deck against its base. Allowed: a number from
+        -20000 to 20000 m.
     """
 
     coverage: float = 0.0
@@ -202,49 +217,57 @@ class UpperClouds(Block):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Weather(Block):
-    """The weather map: where the clouds stand.
+    """The weather map: coverage, type and precipitation by place.
 
     Attributes
     ----------
     extent : float
-        Width of the square that one map covers, about the origin of the world. It lies on the
-        planet in stereographic projection: true at the origin, in proportion anywhere. Allowed: a
-        number from 100 to 10000000 m.
+        Side of the square that the weather map covers, centred on the origin of the world. The map
+        lies on the planet in stereographic projection: true to scale at the origin, conformal
+        everywhere. Allowed: a number from 100 to 10000000 m.
     edge : {repeat, mirror, clamp}
-        What lies beyond that square: the map again, its mirror image, or what is at its edge.
-        Allowed: one of "repeat", "mirror", "clamp".
+        Addressing beyond the edge of the map: `repeat`, `mirror` (every other tile is mirrored) or
+        `clamp` (extends the texels of the edge). Allowed: one of "repeat", "mirror", "clamp".
     map : array of float32, shape (H, W, 3), or None
-        A map of your own: coverage, type and precipitation, row 0 in the north; None bakes one from
-        noise. Allowed: None or a float array of shape (H, W, 3), H and W from 1 to 8192, values
-        from 0 to 1.
+        User-supplied weather map: coverage, type and precipitation; row 0 is in the north, column 0
+        in the west. None bakes a map from noise. Allowed: None or a float array of shape (H, W, 3),
+        H and W from 1 to 8192, values from 0 to 1.
     noise : {worley_perlin, worley_simplex, perlin_worley}
-        Which noises the map is baked from: `worley_simplex` is thesis2018's, `perlin_worley`
-        vsu2022's. Allowed: one of "worley_perlin", "worley_simplex", "perlin_worley".
+        Noises of the baked map: `worley_perlin` is a sum of Worley and Perlin noise,
+        `worley_simplex` a product of Worley and simplex noise (thesis2018), `perlin_worley`
+        Perlin-Worley noise (vsu2022). Allowed: one of "worley_perlin", "worley_simplex",
+        "perlin_worley".
     seed : int
-        Which random weather. Allowed: a whole number from 0 to 4294967295.
+        Random seed of the baked maps. Allowed: a whole number from 0 to 4294967295.
     scale : float
-        Typical distance between clouds. Allowed: a number from 100 to 1000000 m.
+        Typical distance between the clouds of the baked map. Allowed: a number from 100 to 1000000
+        m.
     variety : float
-        How much the cover varies over distances of several clouds. Allowed: a number from 0 to 1.
+        Amplitude of the variation of cloud cover over distances of several clouds, in the baked
+        map. Allowed: a number from 0 to 1.
     type_variety : float
-        How much the type of cloud varies from place to place; 0 makes it the same everywhere.
+        Amplitude of the variation of cloud type in the baked map; 0 makes the type uniform.
         Allowed: a number from 0 to 2.
     broad_variety : float
-        How much a second, larger map shifts the weather, by seed or `broad_map`, so that no part of
-        the sky looks like another; 0 leaves the first map as it is. From 0.3 on the baked one also
-        bends it in full. It leaves a `map` of yours alone. Allowed: a number from 0 to 1.
+        Amplitude of the larger weather map, which offsets coverage, type and precipitation and
+        hides the repetition of the smaller map. The larger map is `broad_map`, or is baked from
+        `seed`. A baked larger map also distorts the smaller map, in full from 0.3 on. 0 switches
+        the larger map off. A user-supplied `map` without a `broad_map` is not changed. Allowed: a
+        number from 0 to 1.
     broad_extent : float
-        Width of the square that the larger map covers; beyond it, that repeats. Allowed: a number
-        from 100 to 10000000 m.
+        Side of the square that the larger map covers. The larger map repeats beyond it. Allowed: a
+        number from 100 to 10000000 m.
     broad_map : array of float32, shape (H, W, 3), or None
-        A larger map of your own: shifts of coverage, type and precipitation, 0.5 is none. Allowed:
-        None or a float array of shape (H, W, 3), H and W from 1 to 8192, values from 0 to 1.
+        User-supplied larger map: offsets of coverage, type and precipitation, 0.5 for no offset.
+        None bakes one from noise, unless `map` is set. Allowed: None or a float array of shape (H,
+        W, 3), H and W from 1 to 8192, values from 0 to 1.
     clear_at : tuple[float, float]
-        Middle of the spot to keep clear, east and north of the origin. It stays while the weather
-        drifts over it. Allowed: 2 numbers from -10000000 to 10000000 m.
+        Centre of the region that is kept clear of clouds, east and north of the origin. The region
+        is fixed in the world while the weather drifts. Allowed: 2 numbers from -10000000 to
+        10000000 m.
     clear_radius : float
-        Radius in which the spot has no cloud; the cover is back half a radius farther out. 0 keeps
-        nothing clear. Allowed: a number from 0 to 10000000 m.
+        Radius of the region without clouds. Cloud cover is back to full at 1.5 times the radius. 0
+        switches the region off. Allowed: a number from 0 to 10000000 m.
     """
 
     extent: float = 60000.0
@@ -264,31 +287,32 @@ class Weather(Block):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Wind(Block):
-    """What moves the clouds.
+    """Winds that carry the base shapes, the detail and the weather map.
 
     Attributes
     ----------
     direction : float
-        Compass direction toward which the base shapes drift and the tops lean, clockwise from
-        north. Allowed: a number from -360 to 360 degrees.
+        Compass direction toward which the base shapes drift and the tops are sheared, clockwise
+        from north. Allowed: a number from -360 to 360 degrees.
     speed : float
         Speed of the base shapes. Allowed: a number from -1000 to 1000 m/s.
     detail_direction : float
-        Compass direction toward which the detail drifts. Allowed: a number from -360 to 360
-        degrees.
+        Compass direction toward which the detail drifts, clockwise from north. Allowed: a number
+        from -360 to 360 degrees.
     detail_speed : float
-        Speed of the detail; the difference to the base shapes makes the edges boil. Allowed: a
-        number from -1000 to 1000 m/s.
+        Speed of the detail. The velocity of the detail relative to the base shapes makes the edges
+        evolve. Allowed: a number from -1000 to 1000 m/s.
     shear : float
-        How far the tops lean downwind (nubis2015: 500 m). Allowed: a number from -20000 to 20000 m.
+        Downwind displacement of the cloud tops against the cloud base (nubis2015: 500 m). Allowed:
+        a number from -20000 to 20000 m.
     updraft : float
-        Speed at which the noises rise. Allowed: a number from -100 to 100 m/s.
+        Upward speed of the noises. Allowed: a number from -100 to 100 m/s.
     weather_direction : float
-        Compass direction toward which the weather map drifts. Allowed: a number from -360 to 360
-        degrees.
+        Compass direction toward which the weather map drifts, clockwise from north. Allowed: a
+        number from -360 to 360 degrees.
     weather_speed : float
-        Speed of the weather map; 0 keeps a composed sky in place while its shapes evolve
-        (thesis2018). Allowed: a number from -1000 to 1000 m/s.
+        Speed of the weather map. 0 keeps a composed sky in place while the shapes of its clouds
+        evolve (thesis2018). Allowed: a number from -1000 to 1000 m/s.
     """
 
     direction: float = 60.0
@@ -303,22 +327,22 @@ class Wind(Block):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Wander(Block):
-    """Winds and cover that wander over hours (gems2001): four slow turns of unlike periods, in
-    closed form, so that any time can be asked for.
+    """Slow variation of winds and cloud cover over hours (gems2001): the mean of four sinusoids of
+    incommensurate periods, in closed form for any time.
 
     Attributes
     ----------
     wind : float
-        By how much the winds wander, as a share of their speed, in speed and direction: at 0.5 a
-        wind blows at a half to one and a half times its speed, within 30 degrees of its direction.
-        All winds wander alike; what leans keeps leaning as it does. Allowed: a number from 0 to 1.
+        Amplitude of the variation of all winds in speed and direction, as a fraction of their
+        speed: at 0.5 a wind blows at 0.5 to 1.5 times its speed and within 30 degrees of its
+        direction. All winds vary alike. Wind shear does not vary. Allowed: a number from 0 to 1.
     coverage : float
-        By how much `clouds.coverage` wanders up and down, within 0 to 1. Allowed: a number from 0
-        to 1.
+        Amplitude of the variation of `clouds.coverage`. The result is clamped to the range from 0
+        to 1. Allowed: a number from 0 to 1.
     period : float
-        How long a swing takes, about. Allowed: a number from 60 to 100000000 s.
+        Typical period of the variation. Allowed: a number from 60 to 100000000 s.
     seed : int
-        Which random swings. Allowed: a whole number from 0 to 4294967295.
+        Random seed of the phases. Allowed: a whole number from 0 to 4294967295.
     """
 
     wind: float = 0.0
@@ -329,36 +353,39 @@ class Wander(Block):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Drift(Block):
-    """Where things are at 0 s, as the winds of now would have it. All 0, unless the winds have
-    changed on the way: `Params.after`, `Keyframes` and `Renderer.animate` set it, so that the sky
-    goes on from where it is.
+    """Displacements at 0 s, from which the present winds carry the clouds on. All are 0 until winds
+    change: `Params.after`, `Keyframes` and `Renderer.animate` set them, so that a change of wind
+    does not move the clouds.
 
     Attributes
     ----------
     shape : tuple[float, float]
-        How far the base shapes are carried, east and north. Allowed: 2 numbers from -1000000000000
-        to 1000000000000 m.
-    detail : tuple[float, float]
-        The detail. Allowed: 2 numbers from -1000000000000 to 1000000000000 m.
-    weather : tuple[float, float]
-        The weather map. Allowed: 2 numbers from -1000000000000 to 1000000000000 m.
-    upper : tuple[float, float]
-        The upper deck, its weather with its shapes. Allowed: 2 numbers from -1000000000000 to
+        Displacement of the base shapes, east and north. Allowed: 2 numbers from -1000000000000 to
         1000000000000 m.
+    detail : tuple[float, float]
+        Displacement of the detail, east and north. Allowed: 2 numbers from -1000000000000 to
+        1000000000000 m.
+    weather : tuple[float, float]
+        Displacement of the weather map, east and north. Allowed: 2 numbers from -1000000000000 to
+        1000000000000 m.
+    upper : tuple[float, float]
+        Displacement of the upper deck (shapes and weather), east and north. Allowed: 2 numbers from
+        -1000000000000 to 1000000000000 m.
     upper_detail : tuple[float, float]
-        The detail of the upper deck. Allowed: 2 numbers from -1000000000000 to 1000000000000 m.
+        Displacement of the detail of the upper deck, east and north. Allowed: 2 numbers from
+        -1000000000000 to 1000000000000 m.
     high : tuple[float, float]
-        The high clouds, along `high_clouds.direction` and to the left of it. Allowed: 2 numbers
-        from -1000000000000 to 1000000000000 m.
+        Displacement of the high clouds, along `high_clouds.direction` and to its left. Allowed: 2
+        numbers from -1000000000000 to 1000000000000 m.
     rise : float
-        How far the updraft has raised the noises. Allowed: a number from -1000000000000 to
+        Upward displacement of the noises by the updraft. Allowed: a number from -1000000000000 to
         1000000000000 m.
     evolution : float
-        How often the largest shapes of the high clouds have been replaced
-        (`high_clouds.evolution`). Allowed: a number from -1000000000000 to 1000000000000.
+        Number of replacements of the largest octave of the high clouds (`high_clouds.evolution`).
+        Allowed: a number from -1000000000000 to 1000000000000.
     swings : float
-        How many times `wander.period` the wander is ahead. Allowed: a number from -1000000000000 to
-        1000000000000.
+        Time offset of the wander, in units of `wander.period`. Allowed: a number from
+        -1000000000000 to 1000000000000.
     """
 
     shape: tuple[float, float] = (0.0, 0.0)
@@ -374,46 +401,47 @@ class Drift(Block):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class HighClouds(Block):
-    """The thin high clouds, a layer without thickness on its own sphere (nubis2015; animated as in
-    gems2001).
+    """The high clouds: a layer without thickness on a sphere of its own (nubis2015), with an
+    animated texture (gems2001).
 
     Attributes
     ----------
     coverage : float
-        How much of the sky they cover: 0 is clear, 1 overcast. Allowed: a number from 0 to 1.
+        Cover of the high clouds: 0 is clear, 1 overcast. Allowed: a number from 0 to 1.
     with_volume : bool
-        Whether they are there with a `volume` too, which is otherwise all the cloud that there is.
+        Whether high clouds are drawn together with a `volume`, which otherwise replaces all clouds.
         Allowed: True or False.
     type : float
-        Cloud type: 0 cirrus in streaks, 1 altocumulus in cells, and between them both, here more of
-        one, there of the other. Allowed: a number from 0 to 1.
+        Type of the high clouds: 0 is streaks of cirrus, 1 cells of altocumulus. Values between mix
+        both, in proportions that vary from place to place. Allowed: a number from 0 to 1.
     altitude : float
         Altitude of the layer. Allowed: a number from 100 to 30000 m.
     optical_depth : float
-        Optical depth, seen from straight below, where they are thickest. Allowed: a number from 0
-        to 100.
+        Vertical optical depth of the layer where it is thickest. Allowed: a number from 0 to 100.
     scale : float
-        Width of one tile of the texture. Allowed: a number from 1000 to 1000000 m.
+        Tile width of the texture. Allowed: a number from 1000 to 1000000 m.
     curve : {exponential, clamp}
-        How thickness grows with what rises above the cover. Allowed: one of "exponential", "clamp".
+        Mapping from texture to optical depth: `exponential` saturates and has soft edges and even
+        cores (gems2001's condensation), `clamp` is linear above a threshold, up to a maximum
+        (gems2001: subtract and clamp). Allowed: one of "exponential", "clamp".
     emboss : float
-        How strongly the flanks toward the sun are bright and those away from it dark (gems2001).
-        Allowed: a number from 0 to 1.
+        Strength of the emboss: flanks toward the sun are brightened, flanks away from it darkened
+        (gems2001). Allowed: a number from 0 to 1.
     stretch : float
-        How much longer than wide the streaks are, along the wind; cells are stretched by its square
+        Ratio of length to width of the streaks, along the wind. Cells are stretched by its square
         root, across it. Allowed: a number from 1 to 16.
     direction : float
-        Compass direction toward which they drift; the streaks lie along it. Allowed: a number from
-        -360 to 360 degrees.
+        Compass direction toward which the high clouds drift, clockwise from north. The streaks lie
+        along it. Allowed: a number from -360 to 360 degrees.
     speed : float
-        Speed at which they drift. Allowed: a number from -1000 to 1000 m/s.
+        Speed of the high clouds. Allowed: a number from -1000 to 1000 m/s.
     evolution : float
-        How often the largest shapes are replaced by new ones; each octave after it twice as often.
-        Allowed: a number from 0 to 10 1/s.
+        Rate at which the largest octave of the texture is replaced by new noise. Each further
+        octave is replaced twice as often as the one before. Allowed: a number from 0 to 10 1/s.
     octaves : int
-        Octaves of noise. Allowed: a whole number from 1 to 8.
+        Number of octaves of the texture. Allowed: a whole number from 1 to 8.
     seed : int
-        Which random shapes. Allowed: a whole number from 0 to 4294967295.
+        Random seed of the texture. Allowed: a whole number from 0 to 4294967295.
     texture_size : int
         Width and height of the texture. Allowed: a whole number from 16 to 4096 texels.
     """
@@ -437,72 +465,75 @@ class HighClouds(Block):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Light(Block):
-    """How light becomes colour.
+    """Light in the clouds: light model, phase function, albedo and ambient light.
 
     Attributes
     ----------
     model : {single, nubis2015, thesis2018, vsu2022, octaves, path}
-        The physics of the light in the clouds. Allowed: one of "single", "nubis2015", "thesis2018",
-        "vsu2022", "octaves", "path".
+        Light model. `single` is physical single scattering. `nubis2015`, `thesis2018` and `vsu2022`
+        are the published models. `octaves` approximates multiple scattering (Wrenninge et al. 2013,
+        Hillaire 2016). `path` traces paths of every order of scattering and is the reference of the
+        others. Allowed: one of "single", "nubis2015", "thesis2018", "vsu2022", "octaves", "path".
     phase : {henyey_greenstein, droplet, mie}
-        The phase function: `henyey_greenstein` of `g` (in thesis2018 and vsu2022 of `g_back`, too)
-        as published; `droplet` a fit of real droplets, whose clouds have a silver lining (Jendersie
-        and d'Eon 2023); `mie` the droplets themselves, with fogbow and glory. Half of what those
-        scatter goes on within a few degrees: `path` then takes many times the samples. Allowed: one
-        of "henyey_greenstein", "droplet", "mie".
+        Phase function. `henyey_greenstein` has the parameter `g` (in thesis2018 and vsu2022
+        `g_back`, too), as published. `droplet` is a fit to cloud droplets, which gives clouds a
+        silver lining (Jendersie and d'Eon 2023). `mie` is Mie scattering by droplets, with fogbow
+        and glory. `droplet` and `mie` scatter half of the light by less than a few degrees, so that
+        `path` needs many times the samples. Allowed: one of "henyey_greenstein", "droplet", "mie".
     droplet_diameter : float
-        Diameter of the droplets (`droplet`, `mie`): fog 5 to 20, cumulus 10 to 30, drizzle 50.
+        Diameter of the droplets for `droplet` and `mie`: fog 5 to 20, cumulus 10 to 30, drizzle 50.
         Allowed: a number from 5 to 50 µm.
     g : float
-        Mean cosine of the forward lobe of the phase function. Allowed: a number from -0.9999 to
-        0.9999.
+        Asymmetry parameter (mean cosine) of the forward lobe of the phase function. Allowed: a
+        number from -0.9999 to 0.9999.
     g_back : float
-        Mean cosine of the backward lobe (thesis2018, vsu2022). Allowed: a number from -0.9999 to
-        0.9999.
+        Asymmetry parameter (mean cosine) of the backward lobe (thesis2018, vsu2022). Allowed: a
+        number from -0.9999 to 0.9999.
     lobe_mix : float
-        Share of the forward lobe (vsu2022). Allowed: a number from 0 to 1.
+        Weight of the forward lobe (vsu2022). Allowed: a number from 0 to 1.
     albedo : float
-        Single-scattering albedo of a droplet (`single`, `octaves`, `path`). Allowed: a number from
-        0 to 1.
+        Single-scattering albedo (`single`, `octaves`, `path`). Allowed: a number from 0 to 1.
     octaves : int
-        Orders of scattering that `octaves` sums up. Allowed: a whole number from 1 to 16.
+        Number of orders of scattering in the sum of the `octaves` model. Allowed: a whole number
+        from 1 to 16.
     octave_scattering : float
-        Share of the light that each octave keeps of the one before. This and the next two are
-        fitted to `path` for three octaves (docs/accuracy.md); 0.5 is usual. Allowed: a number from
-        0 to 1.
+        Factor on the scattered light from one octave to the next. This factor, `octave_extinction`
+        and `octave_phase` are fitted to `path` for three octaves (docs/accuracy.md); 0.5 is usual.
+        Allowed: a number from 0 to 1.
     octave_extinction : float
-        Share of the extinction toward the sun that each octave keeps of the one before. Allowed: a
-        number from 0 to 1.
+        Factor on the extinction toward the sun from one octave to the next. Allowed: a number from
+        0 to 1.
     octave_phase : float
-        Share of `g` that each octave keeps of the one before (of each lobe's, where the phase
-        function is `droplet` or `mie`). Allowed: a number from 0 to 1.
+        Factor on `g` from one octave to the next; with `droplet` and `mie` on the asymmetry of each
+        lobe. Allowed: a number from 0 to 1.
     sun_gain : float
         Gain of the sunlight in the published models, which do not conserve energy. Allowed: a
         number from 0 to 1000.
     absorption : float
-        How thick the published models take the cloud to be on the way to the sun. Allowed: a number
-        from 0 to 10.
+        Factor on the optical depth toward the sun in the published models. Allowed: a number from 0
+        to 10.
     ambient : tuple[float, float, float]
-        Radiance that reaches the clouds from every direction, besides that of sun and sky (all but
-        `single`). Allowed: 3 numbers from 0 to 1000000.
+        Isotropic radiance that lights the clouds in addition to sun and sky (linear, Rec. 709
+        primaries; all models but `single`). Allowed: 3 numbers from 0 to 1000000.
     ambient_gain : float
-        Gain of the ambient light of the sky (all but `single`). Allowed: a number from 0 to 1000.
+        Gain of the ambient light of the sky (all models but `single`). Allowed: a number from 0 to
+        1000.
     ambient_top : tuple[float, float, float]
-        Tint of the ambient light at the top of the clouds; its brightness comes from the sky.
-        Allowed: 3 numbers from 0 to 1000.
+        Tint of the ambient light at the cloud top. Its brightness follows from the sky. Allowed: 3
+        numbers from 0 to 1000.
     ambient_bottom : tuple[float, float, float]
-        Tint of the ambient light at the base of the clouds; its brightness comes from sky and
-        ground. Allowed: 3 numbers from 0 to 1000.
+        Tint of the ambient light at the cloud base. Its brightness follows from sky and ground.
+        Allowed: 3 numbers from 0 to 1000.
     ambient_occlusion : float
-        How much clouds hide sky and ground from themselves: 1 shares the ambient light by their
-        optical depth above and below, 0 by height alone, as the published models do. Allowed: a
-        number from 0 to 1.
+        Occlusion of the ambient light within clouds: 1 weights light from above and below by the
+        optical depths above and below the point (two streams, Bohren 1987), 0 by height alone, as
+        in the published models. Allowed: a number from 0 to 1.
     powder : float
-        How strongly thin edges darken ("powdered sugar", nubis2015); 0 switches it off. Allowed: a
-        number from 0 to 1.
+        Strength of the darkening of thin edges in the published models ("powdered sugar",
+        nubis2015); 0 is none. Allowed: a number from 0 to 1.
     rain_absorption : float
-        How many times more light is absorbed where precipitation is 1 (nubis2015). Allowed: a
-        number from 1 to 100.
+        Factor on the absorption in the published models where precipitation is 1 (nubis2015).
+        Allowed: a number from 1 to 100.
     """
 
     model: Literal["single", "nubis2015", "thesis2018", "vsu2022", "octaves", "path"] = "octaves"
@@ -529,33 +560,35 @@ class Light(Block):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Atmosphere(Block):
-    """The planet and its air.
+    """The planet, its atmosphere, and the shadows of clouds on both.
 
     Attributes
     ----------
     enabled : bool
-        Whether there is air; without it the sky is black, day and night, and sunlight arrives
-        undimmed. Allowed: True or False.
+        Whether there is an atmosphere. Without one the sky is black by day and night, and sunlight
+        is not attenuated. Allowed: True or False.
     planet_radius : float
         Radius of the planet (Earth 6 371 000, thesis2018 400 000). Allowed: a number from 10000 to
         1000000000 m.
     haze : float
-        Haze: amount of aerosol. Each unit is an optical depth of 0.0053 straight up from the
-        ground, at 550 nm as at all wavelengths: 1 is air as clear as over the Antarctic, 10 to 20 a
-        clear day (0.05 to 0.1), 94 thick haze (0.5). Allowed: a number from 0 to 100.
+        Amount of aerosol. One unit has a vertical optical depth of 0.0053 above the ground, at 550
+        nm and at all other wavelengths. 1 is air as clear as over the Antarctic, 10 to 20 a clear
+        day (optical depth 0.05 to 0.1), 94 thick haze (0.5). Allowed: a number from 0 to 100.
     aerial_perspective : float
-        How much air stands between the eye and the clouds: 1 is physical, 0 none. Allowed: a number
-        from 0 to 10.
+        Strength of the aerial perspective in front of the clouds: 1 is physical, 0 none. Allowed: a
+        number from 0 to 10.
     ground_shadows : bool
-        Whether clouds cast shadows on the ground that is seen. Allowed: True or False.
+        Whether clouds cast shadows on the visible ground. Allowed: True or False.
     beams : bool
-        Whether clouds cast shadows on the air: crepuscular rays. Allowed: True or False.
+        Whether clouds cast shadows on the air: light shafts (crepuscular rays). Allowed: True or
+        False.
     ground_albedo : tuple[float, float, float]
-        Albedo of the ground. Allowed: 3 numbers from 0 to 1.
+        Albedo of the ground (linear, Rec. 709 primaries). Allowed: 3 numbers from 0 to 1.
     night : tuple[float, float, float]
-        Radiance of the night's own light above the air, airglow and stars, which is there by day
-        too: 20.9, 21.6 and 22.6 magnitudes a square arcsecond in R, V and B (Patat 2003) beside a
-        sun of 10 and of -27.1, -26.74 and -26.09. Allowed: 3 numbers from 0 to 1000000.
+        Radiance of the night sky above the atmosphere (airglow and stars), present by day too. The
+        default corresponds to a sun of 10: 20.9, 21.6 and 22.6 magnitudes per square arcsecond in
+        R, V and B (Patat 2003) against the sun's -27.1, -26.74 and -26.09. Allowed: 3 numbers from
+        0 to 1000000.
     """
 
     enabled: bool = True
@@ -570,72 +603,78 @@ class Atmosphere(Block):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Quality(Block):
-    """The numerical method: how accurately a sky is computed, never how it looks.
+    """The numerical method: accuracy and cost of a picture. The appearance of the sky is set by
+    `Params` alone.
 
     Attributes
     ----------
     steps_zenith : int
-        View steps straight up. Allowed: a whole number from 1 to 4096.
+        Number of view steps of a ray toward the zenith. Allowed: a whole number from 1 to 4096.
     steps_horizon : int
-        View steps toward the horizon. Allowed: a whole number from 1 to 4096.
+        Number of view steps of a ray toward the horizon. Allowed: a whole number from 1 to 4096.
     step_growth : float
-        How much steps grow with distance: 0 makes all of a ray's steps equal, 1 lets a step be a
-        fixed share of its distance. Allowed: a number from 0 to 1.
+        Growth of the view steps with distance: 0 makes all steps of a ray equal, 1 makes a step a
+        fixed fraction of its distance. Allowed: a number from 0 to 1.
     big_step : int
-        How many steps one step outside cloud is long; on a hit the march goes back. Allowed: a
-        whole number from 1 to 16.
+        Length of a coarse step outside clouds, in view steps. On a hit the march goes back by the
+        coarse step. Allowed: a whole number from 1 to 16.
     leap : float
-        How far a ray may leap through clear air, beyond `big_step`: as a share of
-        `clouds.shape_scale` (of `weather.scale` or two and a half pixels of `weather.map`, if that
-        is less) for each unit that the base shape lacks of being cloud. On a hit the march goes
-        back. 0 leaps no farther than `big_step`; none does where that is 1, in grids and in rain.
-        Allowed: a number from 0 to 1.
+        Sphere-tracing factor for steps through clear air longer than `big_step` (Hart 1996): the
+        step per unit by which the base shape falls short of cloud, as a fraction of
+        `clouds.shape_scale` (of `weather.scale`, or of 2.5 texels of `weather.map`, if that is
+        less). On a hit the march goes back. 0 limits steps to `big_step`. Longer steps are off
+        where `big_step` is 1, in grids and in rain. Allowed: a number from 0 to 1.
     empty_samples : int
-        Full samples of zero in a row after which samples are cheap again (nubis2015: 6). Allowed: a
-        whole number from 1 to 4096.
+        Number of consecutive full samples of zero density before the march takes coarse steps
+        (nubis2015: 6). Allowed: a whole number from 1 to 4096.
     light_steps : int
-        Light samples toward the sun, besides the far one. Where they spread to the end of the
-        clouds, there is a third more for a second deck above the point. Allowed: a whole number
-        from 1 to 128.
+        Number of light samples toward the sun, without the far sample. Where they reach to the end
+        of the clouds (`light_distance` 0), points below a second deck take a third more, for that
+        deck. Allowed: a whole number from 1 to 128.
     light_share : float
-        Share of a pixel's cloud that is lit as one, by the light samples of one place in it:
-        samples in a row are lit together once they have gathered more. 0 lights each sample by
+        Light-group weight: consecutive view samples are lit as a group, by light samples from one
+        point, once their opacity in the pixel exceeds this share. 0 lights each view sample by
         itself. Allowed: a number from 0 to 1.
     light_distance : float
-        How far the light samples reach; 0 spreads them to where the clouds end. Allowed: a number
-        from 0 to 100000 m.
+        Reach of the light samples; 0 extends them to the end of the clouds. Allowed: a number from
+        0 to 100000 m.
     far_sample : bool
-        Whether there is one more light sample, at three times that reach, for shadows from distant
-        clouds (nubis2015). Allowed: True or False.
+        Whether a further light sample is taken at three times the reach of the others, for shadows
+        of distant clouds (nubis2015). Allowed: True or False.
     cone : float
-        Half width of the cone that the light samples are spread over, as a share of its length
-        (nubis2015); 0 looks straight at the sun. Allowed: a number from 0 to 1.
+        Half-width of the cone of the light samples, as a fraction of its length (nubis2015); 0
+        places them on a straight line to the sun. Allowed: a number from 0 to 1.
     cheap_light : float
-        Opacity in front of a sample past which its light samples leave out the detail (nubis2015:
-        0.3). Of those that spread to the end of the clouds, the ones that stand for most of a tile
-        of the detail leave it out always. Allowed: a number from 0 to 1.
+        Detail cut-off of the light samples: opacity in front of a view sample above which its light
+        samples omit the detail noise (nubis2015: 0.3). Light samples that reach to the end of the
+        clouds also omit it wherever they stand for most of a tile of the detail noise. Allowed: a
+        number from 0 to 1.
     min_transmittance : float
-        Transmittance at which a ray ends; what is left is scaled away, not lost. Allowed: a number
-        from 0 to 0.5.
+        Transmittance at which a ray ends. Its radiance is then scaled up to full opacity, so that
+        the remaining light is not lost. Allowed: a number from 0 to 0.5.
     contrast : float
-        Largest contrast between neighbouring rays, past which the pixels between them get rays of
-        their own. Of pixels less than an eighth of a degree wide one in sixteen is marched first,
-        of a quarter one in four, of wider ones every one; 0 marches every one of any width, and 1
-        none but those, so that an animation follows those alone. What is behind the clouds, sky,
-        ground and high clouds seen from below, is then worked out at every fourth of the narrowest
-        pixels, and where it bends by a tenth of this, at edges too; 0 works out every one. Allowed:
-        a number from 0 to 1.
+        Threshold for adaptive sampling: a pixel is marched if the contrast between neighbouring
+        samples exceeds it. 0 marches every pixel; 1 marches only the initial grid and upsamples.
+        The initial grid has one pixel in sixteen if pixels are narrower than an eighth of a degree,
+        one in four up to a quarter of a degree, and every pixel if they are wider. With 1,
+        `Renderer.animate` reprojects the initial grid alone. The background (sky, ground, and high
+        clouds seen from below) is evaluated at every fourth pixel in both directions if pixels are
+        narrower than an eighth of a degree, and at every pixel where its second difference exceeds
+        a tenth of the threshold and along edges; 0 evaluates every pixel. Allowed: a number from 0
+        to 1.
     jitter : bool
-        Whether each ray starts at a blue-noise offset of up to one step. Allowed: True or False.
+        Whether the start of each ray is jittered by blue noise of up to one view step. Allowed:
+        True or False.
     tolerance : float
-        Largest relative change of a pixel when all steps are halved; they are until it is met. It
-        replaces everything above by an integration that converges, and sun rays go to the end of
-        the clouds; 0 marches with the settings above. Allowed: a number from 0 to 1.
+        Tolerance of the reference integrator: the steps are halved until no pixel changes by more
+        than this relative amount. Above 0 the reference integrator replaces the march with all of
+        its settings, and sun rays reach to the end of the clouds. 0 selects the march. Allowed: a
+        number from 0 to 1.
     path_samples : int
-        Paths traced for each pixel (light model `path`). Allowed: a whole number from 2 to 1048576.
+        Number of paths per pixel (light model `path`). Allowed: a whole number from 2 to 1048576.
     path_scatterings : int
-        Most scatterings of a path (light model `path`); 1 is single scattering. Allowed: a whole
-        number from 1 to 1048576.
+        Maximum number of scattering events of a path (light model `path`); 1 is single scattering.
+        Allowed: a whole number from 1 to 1048576.
     """
 
     steps_zenith: int = 134
@@ -665,33 +704,33 @@ class Params(Root):
     Attributes
     ----------
     sun : Sun
-        The sun.
+        Position, irradiance and disc of the sun.
     moon : Moon
-        The moon. It lights air, clouds and ground as the sun does, casts shadows, and shines
-        together with it. Its bright side is toward the sun.
+        Position, phase, irradiance and disc of the moon. Moonlight is added to sunlight: it lights
+        air, clouds and ground, and casts shadows. The lit side of the disc faces the sun.
     clouds : Clouds
-        The volumetric clouds: where they are and what they are made of.
+        The volumetric clouds (lower deck): cover, type, altitude, density and noises.
     upper_clouds : UpperClouds
-        A second deck of volumetric clouds, above the first. Its weather is another part of the same
-        map, and its noises are those of the first at another scale.
+        The upper deck of volumetric clouds, above `clouds`. Its weather is another region of the
+        same weather map. Its noises are those of the lower deck at another scale.
     weather : Weather
-        The weather map: where the clouds stand.
+        The weather map: coverage, type and precipitation by place.
     wind : Wind
-        What moves the clouds.
+        Winds that carry the base shapes, the detail and the weather map.
     wander : Wander
-        Winds and cover that wander over hours (gems2001): four slow turns of unlike periods, in
-        closed form, so that any time can be asked for.
+        Slow variation of winds and cloud cover over hours (gems2001): the mean of four sinusoids of
+        incommensurate periods, in closed form for any time.
     drift : Drift
-        Where things are at 0 s, as the winds of now would have it. All 0, unless the winds have
-        changed on the way: `Params.after`, `Keyframes` and `Renderer.animate` set it, so that the
-        sky goes on from where it is.
+        Displacements at 0 s, from which the present winds carry the clouds on. All are 0 until
+        winds change: `Params.after`, `Keyframes` and `Renderer.animate` set them, so that a change
+        of wind does not move the clouds.
     high_clouds : HighClouds
-        The thin high clouds, a layer without thickness on its own sphere (nubis2015; animated as in
-        gems2001).
+        The high clouds: a layer without thickness on a sphere of its own (nubis2015), with an
+        animated texture (gems2001).
     light : Light
-        How light becomes colour.
+        Light in the clouds: light model, phase function, albedo and ambient light.
     atmosphere : Atmosphere
-        The planet and its air.
+        The planet, its atmosphere, and the shadows of clouds on both.
     weather_mix : tuple of (Weather, float)
         Other weathers and their shares of the weather map: each from 0 to 1, together 1 at most;
         the rest is that of `weather`. All have the same `extent` and `edge`. Weathers change by it

@@ -13,31 +13,31 @@ use crate::volume::DensityGrid;
 use crate::{choice, params};
 
 choice! {
-    /// Which noises the base shape is made of.
+    /// Noises of the base shape and the detail.
     Noise {
-        /// Perlin-Worley and three octaves of Worley FBM.
+        /// Base shape: Perlin-Worley noise and three octaves of Worley FBM. Detail: Worley FBM (nubis2015).
         Nubis2015 = "nubis2015",
-        /// Perlin-Worley of rising frequency in every channel.
+        /// Perlin-Worley noise of rising frequency in every channel (vsu2022).
         Vsu2022 = "vsu2022",
     }
 }
 
 choice! {
-    /// How the texture of the high clouds becomes thickness.
+    /// Mapping from the texture of the high clouds to optical depth.
     Curve {
-        /// Ever less the denser it is: soft edges and even cores (gems2001's "condensation").
+        /// Exponential saturation: soft edges and even cores (gems2001's "condensation").
         Exponential = "exponential",
-        /// In proportion to what is above a level, up to the thickest (gems2001: subtract and clamp).
+        /// Linear above a threshold, up to a maximum (gems2001: subtract and clamp).
         Clamp = "clamp",
     }
 }
 
 choice! {
-    /// Which noises the weather map is made of.
+    /// Noises of the baked weather map.
     WeatherNoise {
-        /// Blobs of Worley noise that lean on a Perlin noise.
+        /// Sum of Worley and Perlin noise.
         WorleyPerlin = "worley_perlin",
-        /// Worley noise weighed by simplex noise (thesis2018).
+        /// Product of Worley and simplex noise (thesis2018).
         WorleySimplex = "worley_simplex",
         /// Perlin-Worley noise (vsu2022).
         PerlinWorley = "perlin_worley",
@@ -45,406 +45,440 @@ choice! {
 }
 
 choice! {
-    /// What lies beyond the edge of the weather map.
+    /// Addressing of the weather map beyond its edge.
     Edge {
-        /// The map again.
+        /// Repeats the map.
         Repeat = "repeat",
-        /// Its mirror image.
+        /// Repeats the map, mirrored in every other tile.
         Mirror = "mirror",
-        /// The texels of its edge, for ever.
+        /// Extends the texels of the edge.
         Clamp = "clamp",
     }
 }
 
 choice! {
-    /// How sunlight becomes the brightness of a cloud.
+    /// Light model: the radiance that a cloud scatters toward the camera.
     Model {
-        /// Physical single scattering and nothing else.
+        /// Physical single scattering alone.
         Single = "single",
-        /// Beer times powder times Henyey-Greenstein times 2, and ambient.
+        /// Beer's law, times powder, times Henyey-Greenstein, times 2, plus ambient light.
         Nubis2015 = "nubis2015",
-        /// Beer with a slower second term, the larger of two lobes, powder, and ambient.
+        /// Beer's law with a slower second term, the larger of two lobes, powder, and ambient light.
         Thesis2018 = "thesis2018",
-        /// As nubis2015 with a blend of two lobes.
+        /// `nubis2015` with a blend of two lobes.
         Vsu2022 = "vsu2022",
-        /// Single scattering, and more of it with ever less extinction and anisotropy for the orders after the first
-        /// (Wrenninge et al. 2013, Hillaire 2016), and ambient.
+        /// Approximation of multiple scattering: a sum of octaves of single scattering, each with less extinction and
+        /// less anisotropy than the one before (Wrenninge et al. 2013, Hillaire 2016), plus ambient light.
         Octaves = "octaves",
-        /// Every order of scattering, path traced: slow, with noise, and the truth that the others are measured by.
+        /// Path tracing of every order of scattering: slow and noisy. It is the reference of the other models.
         Path = "path",
     }
 }
 
 choice! {
-    /// How much light a droplet scatters in which direction.
+    /// Phase function of the cloud droplets.
     Phase {
-        /// Henyey and Greenstein's function of `g` (and of `g_back` in thesis2018 and vsu2022): the published models'.
+        /// Henyey-Greenstein with `g` (and `g_back` in thesis2018 and vsu2022), as in the published models.
         HenyeyGreenstein = "henyey_greenstein",
-        /// Jendersie and d'Eon's fit of cloud droplets (2023): the forward peak, without bow and glory.
+        /// Fit to Mie scattering by cloud droplets (Jendersie and d'Eon 2023): forward peak, no fogbow, no glory.
         Droplet = "droplet",
-        /// Mie's own function of cloud droplets, baked: with fogbow and glory.
+        /// Mie scattering by cloud droplets, tabulated: with fogbow and glory.
         Mie = "mie",
     }
 }
 
 params! {
-    /// The sun.
+    /// Position, irradiance and disc of the sun.
     Sun {
-        /// Height above the horizon.
+        /// Elevation above the horizon, geometric (without refraction).
         elevation: f32 = 40.0, in -90..=90 "degrees";
-        /// Compass direction, clockwise from north.
+        /// Azimuth, clockwise from north.
         azimuth: f32 = 120.0, in -360..=360 "degrees";
-        /// Irradiance on a plane that faces the sun, above the atmosphere (linear Rec. 709).
+        /// Irradiance above the atmosphere on a plane that faces the sun (linear, Rec. 709 primaries). Its unit, per
+        /// steradian, is the unit of the picture (docs/units.md).
         irradiance: [f32; 3] = [10.0, 10.0, 10.0], in 0..=1000000 "";
         /// Whether the sun's disc is drawn.
         visible: bool = true;
     }
 
-    /// The moon. It lights air, clouds and ground as the sun does, casts shadows, and shines together with it. Its bright side is
-    /// toward the sun.
+    /// Position, phase, irradiance and disc of the moon. Moonlight is added to sunlight: it lights air, clouds and
+    /// ground, and casts shadows. The lit side of the disc faces the sun.
     Moon {
-        /// Height above the horizon; at -90, the default, there is none.
+        /// Elevation above the horizon. -90, the default, switches the moon off.
         elevation: f32 = -90.0, in -90..=90 "degrees";
-        /// Compass direction, clockwise from north.
+        /// Azimuth, clockwise from north.
         azimuth: f32 = 180.0, in -360..=360 "degrees";
-        /// Age as a share of a month: 0 is new, 0.25 half, 0.5 full, 0.75 half again and 1 new. A half moon has a tenth of the
-        /// light of a full one (Krisciunas and Schaefer 1991).
+        /// Age as a fraction of the lunar month: 0 is new moon, 0.25 first quarter, 0.5 full moon, 0.75 last quarter,
+        /// 1 new moon. The irradiance of a half moon is a tenth of that of a full moon (Krisciunas and Schaefer
+        /// 1991).
         phase: f32 = 0.5, in 0..=1 "";
-        /// Irradiance of the full moon on a plane that faces it, above the air, in the unit of `sun.irradiance`. The default is
-        /// as much less than a sun of 10 as the magnitude of -12.73 is than -26.74, and as much redder as B - V = 0.92 is than 0.65
-        /// (Allen's Astrophysical Quantities).
+        /// Irradiance of the full moon above the atmosphere on a plane that faces the moon, in the unit of
+        /// `sun.irradiance`. The default corresponds to a sun of 10: its brightness follows from apparent magnitudes
+        /// of -12.73 (moon) and -26.74 (sun), its colour from B - V of 0.92 (moon) and 0.65 (sun; Allen's
+        /// Astrophysical Quantities).
         irradiance: [f32; 3] = [2.7e-5, 2.5e-5, 2.0e-5], in 0..=1000000 "";
         /// Whether the moon's disc is drawn.
         visible: bool = true;
     }
 
-    /// The volumetric clouds: where they are and what they are made of.
+    /// The volumetric clouds (lower deck): cover, type, altitude, density and noises.
     Clouds {
-        /// How much of the sky is cloudy: shifts the weather map's coverage, 0 is clear, 0.5 the map as it is, 1 overcast.
+        /// Cloud cover: an offset of `2 * coverage - 1` to the coverage of the weather map. 0 is a clear sky, 0.5
+        /// leaves the map unchanged, 1 is overcast.
         coverage: f32 = 0.45, in 0..=1 "";
-        /// Cloud type: 0 stratus, 0.5 stratocumulus, 1 cumulus. Shifts the weather map's type, 0.5 the map as it is.
+        /// Cloud type: an offset of `2 * type - 1` to the type of the weather map, in which 0 is stratus, 0.5
+        /// stratocumulus and 1 cumulus. 0.5 leaves the map unchanged.
         r#type: f32 = 0.85, in 0..=1 "";
-        /// Rain: thickens and darkens the clouds and lets them grow to cumulonimbus (nubis2015). Scales the weather map's
-        /// precipitation, 0 is dry.
+        /// Precipitation: a factor on the precipitation of the weather map; 0 is dry. Precipitation thickens and
+        /// darkens clouds and makes cumulus grow into cumulonimbus (nubis2015).
         precipitation: f32 = 0.0, in 0..=1 "";
         /// Altitude of the cloud base.
         base: f32 = 1200.0, in 0..=20000 "m";
-        /// Altitude of the highest cloud tops where there is no rain.
+        /// Altitude of the highest cloud tops without precipitation.
         top: f32 = 3200.0, in 1..=25000 "m";
         /// Altitude of the tops of cumulonimbus, where precipitation is 1 (nubis2015: 8 km).
         cumulonimbus_top: f32 = 8000.0, in 1..=25000 "m";
-        /// How far the tops of cumulonimbus spread.
+        /// Horizontal extent of the anvils at the tops of cumulonimbus.
         anvil: f32 = 0.5, in 0..=1 "";
-        /// Extinction of the rain that is seen below the clouds where it is heaviest; 0 hides it. What is thinner than clean air
-        /// (1e-5) evaporates before it reaches the ground.
+        /// Extinction of the rain below the clouds at the heaviest precipitation; 0 hides the rain. Rain with less
+        /// extinction than clean air (1e-5) evaporates before it reaches the ground.
         rain_extinction: f32 = 0.0, in 0..=1 "1/m";
-        /// Extinction where the density is 1.
+        /// Extinction at density 1.
         extinction: f32 = 0.2, in 0..=100000000 "1/m";
-        /// Which random shapes.
+        /// Random seed of the noises.
         seed: u32 = 1, in 0..=4294967295.0 "";
-        /// Which noises the shapes are made of.
+        /// Noises of base shape and detail. `nubis2015`: Perlin-Worley noise and three octaves of Worley FBM for the
+        /// base shape, Worley FBM for the detail. `vsu2022`: Perlin-Worley noise of rising frequency in every
+        /// channel.
         noise: Noise = Noise::Nubis2015;
-        /// Width of one tile of the base shape.
+        /// Tile width of the base-shape noise.
         shape_scale: f32 = 5200.0, in 100..=200000 "m";
-        /// Width of one tile of the detail that erodes the edges.
+        /// Tile width of the detail noise, which erodes the edges.
         detail_scale: f32 = 420.0, in 10..=50000 "m";
-        /// How deep the detail erodes the edges (nubis2015: 0.2).
+        /// Depth of the erosion by the detail noise (nubis2015: 0.2).
         detail: f32 = 0.2, in 0..=1 "";
-        /// How much of a finer detail, a fifth as wide, is added to it: what shows of clouds that are near. 0 leaves it out
-        /// (nubis2015).
+        /// Weight of a finer detail noise, a fifth as wide, that is added to the detail noise. It is visible in near
+        /// clouds. 0 leaves it out (nubis2015).
         fine_detail: f32 = 0.6, in 0..=1 "";
-        /// Width of one tile of the curl noise that swirls the detail.
+        /// Tile width of the curl noise, which distorts the detail noise.
         curl_scale: f32 = 1600.0, in 10..=50000 "m";
-        /// How far curl noise displaces the detail at the base.
+        /// Displacement of the detail noise by the curl noise at the cloud base. It falls to 0 at the cloud top.
         curl: f32 = 70.0, in 0..=2000 "m";
-        /// Where the density of stratus rises from 0 to 1 and where it falls back, as fractions of its height (nubis2015,
-        /// figure 4.10; vsu2022's gradients).
+        /// Height profile of stratus: the fractions of the height at which the density starts to rise from 0, reaches
+        /// 1, starts to fall, and reaches 0 (nubis2015, figure 4.10; vsu2022's gradients).
         stratus: [f32; 4] = [0.02, 0.05, 0.09, 0.11], in 0..=1 "";
-        /// The same for stratocumulus.
+        /// Height profile of stratocumulus, as four fractions of the height in the order of `stratus`.
         stratocumulus: [f32; 4] = [0.02, 0.12, 0.35, 0.60], in 0..=1 "";
-        /// The same for cumulus.
+        /// Height profile of cumulus, as four fractions of the height in the order of `stratus`.
         cumulus: [f32; 4] = [0.01, 0.07, 0.25, 1.0], in 0..=1 "";
-        /// The same for cumulonimbus.
+        /// Height profile of cumulonimbus, as four fractions of the height in the order of `stratus`.
         cumulonimbus: [f32; 4] = [0.005, 0.04, 0.8, 1.0], in 0..=1 "";
-        /// Density by height and type in place of the first three: row 0 at the tops, column 0 type 0 (Frostbite 2016).
+        /// Table of density by height and type that replaces `stratus`, `stratocumulus` and `cumulus`: row 0 is the
+        /// top of the clouds, the last row their base, column 0 type 0, the last column type 1 (Frostbite 2016).
         profile: Option<Table> = None, in 0..=1 "";
     }
 
-    /// A second deck of volumetric clouds, above the first. Its weather is another part of the same map, and its noises are
-    /// those of the first at another scale.
+    /// The upper deck of volumetric clouds, above `clouds`. Its weather is another region of the same weather map.
+    /// Its noises are those of the lower deck at another scale.
     UpperClouds {
-        /// How much of the sky it covers: as `clouds.coverage`; 0 is none.
+        /// Cloud cover of the upper deck, in the scale of `clouds.coverage`; 0 switches the deck off.
         coverage: f32 = 0.0, in 0..=1 "";
-        /// Cloud type: as `clouds.type`.
+        /// Cloud type of the upper deck, in the scale of `clouds.type`.
         r#type: f32 = 0.5, in 0..=1 "";
-        /// Altitude of its base.
+        /// Altitude of the base of the upper deck: at or above `clouds.top` unless `coverage` is 0.
         base: f32 = 4800.0, in 0..=25000 "m";
-        /// Altitude of its tops.
+        /// Altitude of the tops of the upper deck.
         top: f32 = 5600.0, in 1..=25000 "m";
-        /// Extinction where the density is 1.
+        /// Extinction of the upper deck at density 1.
         extinction: f32 = 0.06, in 0..=100000000 "1/m";
-        /// Size of its clouds, as a share of the size of those below.
+        /// Size of the clouds of the upper deck, as a factor on the size of those of the lower deck.
         scale: f32 = 0.4, in 0.01..=100 "";
-        /// Compass direction toward which its wind blows, clockwise from north.
+        /// Compass direction toward which the upper deck drifts, clockwise from north.
         direction: f32 = 95.0, in -360..=360 "degrees";
-        /// Speed of that wind.
+        /// Wind speed of the upper deck.
         speed: f32 = 16.0, in -1000..=1000 "m/s";
-        /// How far its tops lean downwind.
+        /// Downwind displacement of the tops of the upper deck against its base.
         shear: f32 = 150.0, in -20000..=20000 "m";
     }
 
-    /// The weather map: where the clouds stand.
+    /// The weather map: coverage, type and precipitation by place.
     Weather {
-        /// Width of the square that one map covers, about the origin of the world. It lies on the planet in stereographic
-        /// projection: true at the origin, in proportion anywhere.
+        /// Side of the square that the weather map covers, centred on the origin of the world. The map lies on the
+        /// planet in stereographic projection: true to scale at the origin, conformal everywhere.
         extent: f32 = 60000.0, in 100..=10000000 "m";
-        /// What lies beyond that square: the map again, its mirror image, or what is at its edge.
+        /// Addressing beyond the edge of the map: `repeat`, `mirror` (every other tile is mirrored) or `clamp`
+        /// (extends the texels of the edge).
         edge: Edge = Edge::Repeat;
-        /// A map of your own: coverage, type and precipitation, row 0 in the north; None bakes one from noise.
+        /// User-supplied weather map: coverage, type and precipitation; row 0 is in the north, column 0 in the west.
+        /// None bakes a map from noise.
         map: Option<Arc<Map>> = None, in 0..=1 "";
-        /// Which noises the map is baked from: `worley_simplex` is thesis2018's, `perlin_worley` vsu2022's.
+        /// Noises of the baked map: `worley_perlin` is a sum of Worley and Perlin noise, `worley_simplex` a product
+        /// of Worley and simplex noise (thesis2018), `perlin_worley` Perlin-Worley noise (vsu2022).
         noise: WeatherNoise = WeatherNoise::WorleyPerlin;
-        /// Which random weather.
+        /// Random seed of the baked maps.
         seed: u32 = 7, in 0..=4294967295.0 "";
-        /// Typical distance between clouds.
+        /// Typical distance between the clouds of the baked map.
         scale: f32 = 5000.0, in 100..=1000000 "m";
-        /// How much the cover varies over distances of several clouds.
+        /// Amplitude of the variation of cloud cover over distances of several clouds, in the baked map.
         variety: f32 = 0.5, in 0..=1 "";
-        /// How much the type of cloud varies from place to place; 0 makes it the same everywhere.
+        /// Amplitude of the variation of cloud type in the baked map; 0 makes the type uniform.
         type_variety: f32 = 0.9, in 0..=2 "";
-        /// How much a second, larger map shifts the weather, by seed or `broad_map`, so that no part of the sky looks like
-        /// another; 0 leaves the first map as it is. From 0.3 on the baked one also bends it in full. It leaves a `map` of
-        /// yours alone.
+        /// Amplitude of the larger weather map, which offsets coverage, type and precipitation and hides the
+        /// repetition of the smaller map. The larger map is `broad_map`, or is baked from `seed`. A baked larger map
+        /// also distorts the smaller map, in full from 0.3 on. 0 switches the larger map off. A user-supplied `map`
+        /// without a `broad_map` is not changed.
         broad_variety: f32 = 0.3, in 0..=1 "";
-        /// Width of the square that the larger map covers; beyond it, that repeats.
+        /// Side of the square that the larger map covers. The larger map repeats beyond it.
         broad_extent: f32 = 430000.0, in 100..=10000000 "m";
-        /// A larger map of your own: shifts of coverage, type and precipitation, 0.5 is none.
+        /// User-supplied larger map: offsets of coverage, type and precipitation, 0.5 for no offset. None bakes one
+        /// from noise, unless `map` is set.
         broad_map: Option<Arc<Map>> = None, in 0..=1 "";
-        /// Middle of the spot to keep clear, east and north of the origin. It stays while the weather drifts over it.
+        /// Centre of the region that is kept clear of clouds, east and north of the origin. The region is fixed in
+        /// the world while the weather drifts.
         clear_at: [f32; 2] = [0.0, 0.0], in -10000000..=10000000 "m";
-        /// Radius in which the spot has no cloud; the cover is back half a radius farther out. 0 keeps nothing clear.
+        /// Radius of the region without clouds. Cloud cover is back to full at 1.5 times the radius. 0 switches the
+        /// region off.
         clear_radius: f32 = 0.0, in 0..=10000000 "m";
     }
 
-    /// What moves the clouds.
+    /// Winds that carry the base shapes, the detail and the weather map.
     Wind {
-        /// Compass direction toward which the base shapes drift and the tops lean, clockwise from north.
+        /// Compass direction toward which the base shapes drift and the tops are sheared, clockwise from north.
         direction: f32 = 60.0, in -360..=360 "degrees";
         /// Speed of the base shapes.
         speed: f32 = 8.0, in -1000..=1000 "m/s";
-        /// Compass direction toward which the detail drifts.
+        /// Compass direction toward which the detail drifts, clockwise from north.
         detail_direction: f32 = 60.0, in -360..=360 "degrees";
-        /// Speed of the detail; the difference to the base shapes makes the edges boil.
+        /// Speed of the detail. The velocity of the detail relative to the base shapes makes the edges evolve.
         detail_speed: f32 = 11.0, in -1000..=1000 "m/s";
-        /// How far the tops lean downwind (nubis2015: 500 m).
+        /// Downwind displacement of the cloud tops against the cloud base (nubis2015: 500 m).
         shear: f32 = 400.0, in -20000..=20000 "m";
-        /// Speed at which the noises rise.
+        /// Upward speed of the noises.
         updraft: f32 = 0.8, in -100..=100 "m/s";
-        /// Compass direction toward which the weather map drifts.
+        /// Compass direction toward which the weather map drifts, clockwise from north.
         weather_direction: f32 = 60.0, in -360..=360 "degrees";
-        /// Speed of the weather map; 0 keeps a composed sky in place while its shapes evolve (thesis2018).
+        /// Speed of the weather map. 0 keeps a composed sky in place while the shapes of its clouds evolve
+        /// (thesis2018).
         weather_speed: f32 = 8.0, in -1000..=1000 "m/s";
     }
 
-    /// Winds and cover that wander over hours (gems2001): four slow turns of unlike periods, in closed form, so that any
-    /// time can be asked for.
+    /// Slow variation of winds and cloud cover over hours (gems2001): the mean of four sinusoids of incommensurate
+    /// periods, in closed form for any time.
     Wander {
-        /// By how much the winds wander, as a share of their speed, in speed and direction: at 0.5 a wind blows at a half to
-        /// one and a half times its speed, within 30 degrees of its direction. All winds wander alike; what leans keeps
-        /// leaning as it does.
+        /// Amplitude of the variation of all winds in speed and direction, as a fraction of their speed: at 0.5 a
+        /// wind blows at 0.5 to 1.5 times its speed and within 30 degrees of its direction. All winds vary alike.
+        /// Wind shear does not vary.
         wind: f32 = 0.0, in 0..=1 "";
-        /// By how much `clouds.coverage` wanders up and down, within 0 to 1.
+        /// Amplitude of the variation of `clouds.coverage`. The result is clamped to the range from 0 to 1.
         coverage: f32 = 0.0, in 0..=1 "";
-        /// How long a swing takes, about.
+        /// Typical period of the variation.
         period: f32 = 7200.0, in 60..=100000000 "s";
-        /// Which random swings.
+        /// Random seed of the phases.
         seed: u32 = 11, in 0..=4294967295.0 "";
     }
 
-    /// Where things are at 0 s, as the winds of now would have it. All 0, unless the winds have changed on the way:
-    /// `Params.after`, `Keyframes` and `Renderer.animate` set it, so that the sky goes on from where it is.
+    /// Displacements at 0 s, from which the present winds carry the clouds on. All are 0 until winds change:
+    /// `Params.after`, `Keyframes` and `Renderer.animate` set them, so that a change of wind does not move the
+    /// clouds.
     Drift {
-        /// How far the base shapes are carried, east and north.
+        /// Displacement of the base shapes, east and north.
         shape: [f64; 2] = [0.0, 0.0], in -1000000000000.0..=1000000000000.0 "m";
-        /// The detail.
+        /// Displacement of the detail, east and north.
         detail: [f64; 2] = [0.0, 0.0], in -1000000000000.0..=1000000000000.0 "m";
-        /// The weather map.
+        /// Displacement of the weather map, east and north.
         weather: [f64; 2] = [0.0, 0.0], in -1000000000000.0..=1000000000000.0 "m";
-        /// The upper deck, its weather with its shapes.
+        /// Displacement of the upper deck (shapes and weather), east and north.
         upper: [f64; 2] = [0.0, 0.0], in -1000000000000.0..=1000000000000.0 "m";
-        /// The detail of the upper deck.
+        /// Displacement of the detail of the upper deck, east and north.
         upper_detail: [f64; 2] = [0.0, 0.0], in -1000000000000.0..=1000000000000.0 "m";
-        /// The high clouds, along `high_clouds.direction` and to the left of it.
+        /// Displacement of the high clouds, along `high_clouds.direction` and to its left.
         high: [f64; 2] = [0.0, 0.0], in -1000000000000.0..=1000000000000.0 "m";
-        /// How far the updraft has raised the noises.
+        /// Upward displacement of the noises by the updraft.
         rise: f64 = 0.0, in -1000000000000.0..=1000000000000.0 "m";
-        /// How often the largest shapes of the high clouds have been replaced (`high_clouds.evolution`).
+        /// Number of replacements of the largest octave of the high clouds (`high_clouds.evolution`).
         evolution: f64 = 0.0, in -1000000000000.0..=1000000000000.0 "";
-        /// How many times `wander.period` the wander is ahead.
+        /// Time offset of the wander, in units of `wander.period`.
         swings: f64 = 0.0, in -1000000000000.0..=1000000000000.0 "";
     }
 
-    /// The thin high clouds, a layer without thickness on its own sphere (nubis2015; animated as in gems2001).
+    /// The high clouds: a layer without thickness on a sphere of its own (nubis2015), with an animated texture
+    /// (gems2001).
     HighClouds {
-        /// How much of the sky they cover: 0 is clear, 1 overcast.
+        /// Cover of the high clouds: 0 is clear, 1 overcast.
         coverage: f32 = 0.5, in 0..=1 "";
-        /// Whether they are there with a `volume` too, which is otherwise all the cloud that there is.
+        /// Whether high clouds are drawn together with a `volume`, which otherwise replaces all clouds.
         with_volume: bool = false;
-        /// Cloud type: 0 cirrus in streaks, 1 altocumulus in cells, and between them both, here more of one, there of the other.
+        /// Type of the high clouds: 0 is streaks of cirrus, 1 cells of altocumulus. Values between mix both, in
+        /// proportions that vary from place to place.
         r#type: f32 = 0.0, in 0..=1 "";
         /// Altitude of the layer.
         altitude: f32 = 8500.0, in 100..=30000 "m";
-        /// Optical depth, seen from straight below, where they are thickest.
+        /// Vertical optical depth of the layer where it is thickest.
         optical_depth: f32 = 0.5, in 0..=100 "";
-        /// Width of one tile of the texture.
+        /// Tile width of the texture.
         scale: f32 = 42000.0, in 1000..=1000000 "m";
-        /// How thickness grows with what rises above the cover.
+        /// Mapping from texture to optical depth: `exponential` saturates and has soft edges and even cores
+        /// (gems2001's condensation), `clamp` is linear above a threshold, up to a maximum (gems2001: subtract and
+        /// clamp).
         curve: Curve = Curve::Exponential;
-        /// How strongly the flanks toward the sun are bright and those away from it dark (gems2001).
+        /// Strength of the emboss: flanks toward the sun are brightened, flanks away from it darkened (gems2001).
         emboss: f32 = 0.0, in 0..=1 "";
-        /// How much longer than wide the streaks are, along the wind; cells are stretched by its square root, across it.
+        /// Ratio of length to width of the streaks, along the wind. Cells are stretched by its square root, across
+        /// it.
         stretch: f32 = 3.0, in 1..=16 "";
-        /// Compass direction toward which they drift; the streaks lie along it.
+        /// Compass direction toward which the high clouds drift, clockwise from north. The streaks lie along it.
         direction: f32 = 75.0, in -360..=360 "degrees";
-        /// Speed at which they drift.
+        /// Speed of the high clouds.
         speed: f32 = 25.0, in -1000..=1000 "m/s";
-        /// How often the largest shapes are replaced by new ones; each octave after it twice as often.
+        /// Rate at which the largest octave of the texture is replaced by new noise. Each further octave is replaced
+        /// twice as often as the one before.
         evolution: f32 = 0.001, in 0..=10 "1/s";
-        /// Octaves of noise.
+        /// Number of octaves of the texture.
         octaves: u32 = 5, in 1..=8 "";
-        /// Which random shapes.
+        /// Random seed of the texture.
         seed: u32 = 3, in 0..=4294967295.0 "";
         /// Width and height of the texture.
         texture_size: u32 = 512, in 16..=4096 "texels";
     }
 
-    /// How light becomes colour.
+    /// Light in the clouds: light model, phase function, albedo and ambient light.
     Light {
-        /// The physics of the light in the clouds.
+        /// Light model. `single` is physical single scattering. `nubis2015`, `thesis2018` and `vsu2022` are the
+        /// published models. `octaves` approximates multiple scattering (Wrenninge et al. 2013, Hillaire 2016).
+        /// `path` traces paths of every order of scattering and is the reference of the others.
         model: Model = Model::Octaves;
-        /// The phase function: `henyey_greenstein` of `g` (in thesis2018 and vsu2022 of `g_back`, too) as published;
-        /// `droplet` a fit of real droplets, whose clouds have a silver lining (Jendersie and d'Eon 2023); `mie` the droplets
-        /// themselves, with fogbow and glory. Half of what those scatter goes on within a few degrees: `path` then takes many
-        /// times the samples.
+        /// Phase function. `henyey_greenstein` has the parameter `g` (in thesis2018 and vsu2022 `g_back`, too), as
+        /// published. `droplet` is a fit to cloud droplets, which gives clouds a silver lining (Jendersie and d'Eon
+        /// 2023). `mie` is Mie scattering by droplets, with fogbow and glory. `droplet` and `mie` scatter half of the
+        /// light by less than a few degrees, so that `path` needs many times the samples.
         phase: Phase = Phase::HenyeyGreenstein;
-        /// Diameter of the droplets (`droplet`, `mie`): fog 5 to 20, cumulus 10 to 30, drizzle 50.
+        /// Diameter of the droplets for `droplet` and `mie`: fog 5 to 20, cumulus 10 to 30, drizzle 50.
         droplet_diameter: f32 = 20.0, in 5..=50 "µm";
-        /// Mean cosine of the forward lobe of the phase function.
+        /// Asymmetry parameter (mean cosine) of the forward lobe of the phase function.
         g: f32 = 0.6, in -0.9999..=0.9999 "";
-        /// Mean cosine of the backward lobe (thesis2018, vsu2022).
+        /// Asymmetry parameter (mean cosine) of the backward lobe (thesis2018, vsu2022).
         g_back: f32 = -0.25, in -0.9999..=0.9999 "";
-        /// Share of the forward lobe (vsu2022).
+        /// Weight of the forward lobe (vsu2022).
         lobe_mix: f32 = 0.5, in 0..=1 "";
-        /// Single-scattering albedo of a droplet (`single`, `octaves`, `path`).
+        /// Single-scattering albedo (`single`, `octaves`, `path`).
         albedo: f32 = 0.999, in 0..=1 "";
-        /// Orders of scattering that `octaves` sums up.
+        /// Number of orders of scattering in the sum of the `octaves` model.
         octaves: u32 = 3, in 1..=16 "";
-        /// Share of the light that each octave keeps of the one before. This and the next two are fitted to `path` for three
-        /// octaves (docs/accuracy.md); 0.5 is usual.
+        /// Factor on the scattered light from one octave to the next. This factor, `octave_extinction` and
+        /// `octave_phase` are fitted to `path` for three octaves (docs/accuracy.md); 0.5 is usual.
         octave_scattering: f32 = 0.91, in 0..=1 "";
-        /// Share of the extinction toward the sun that each octave keeps of the one before.
+        /// Factor on the extinction toward the sun from one octave to the next.
         octave_extinction: f32 = 0.26, in 0..=1 "";
-        /// Share of `g` that each octave keeps of the one before (of each lobe's, where the phase function is `droplet` or
-        /// `mie`).
+        /// Factor on `g` from one octave to the next; with `droplet` and `mie` on the asymmetry of each lobe.
         octave_phase: f32 = 0.25, in 0..=1 "";
         /// Gain of the sunlight in the published models, which do not conserve energy.
         sun_gain: f32 = 2.2, in 0..=1000 "";
-        /// How thick the published models take the cloud to be on the way to the sun.
+        /// Factor on the optical depth toward the sun in the published models.
         absorption: f32 = 0.22, in 0..=10 "";
-        /// Radiance that reaches the clouds from every direction, besides that of sun and sky (all but `single`).
+        /// Isotropic radiance that lights the clouds in addition to sun and sky (linear, Rec. 709 primaries; all
+        /// models but `single`).
         ambient: [f32; 3] = [0.0, 0.0, 0.0], in 0..=1000000 "";
-        /// Gain of the ambient light of the sky (all but `single`).
+        /// Gain of the ambient light of the sky (all models but `single`).
         ambient_gain: f32 = 1.0, in 0..=1000 "";
-        /// Tint of the ambient light at the top of the clouds; its brightness comes from the sky.
+        /// Tint of the ambient light at the cloud top. Its brightness follows from the sky.
         ambient_top: [f32; 3] = [1.0, 1.0, 1.0], in 0..=1000 "";
-        /// Tint of the ambient light at the base of the clouds; its brightness comes from sky and ground.
+        /// Tint of the ambient light at the cloud base. Its brightness follows from sky and ground.
         ambient_bottom: [f32; 3] = [1.0, 1.0, 1.0], in 0..=1000 "";
-        /// How much clouds hide sky and ground from themselves: 1 shares the ambient light by their optical depth above and
-        /// below, 0 by height alone, as the published models do.
+        /// Occlusion of the ambient light within clouds: 1 weights light from above and below by the optical depths
+        /// above and below the point (two streams, Bohren 1987), 0 by height alone, as in the published models.
         ambient_occlusion: f32 = 1.0, in 0..=1 "";
-        /// How strongly thin edges darken ("powdered sugar", nubis2015); 0 switches it off.
+        /// Strength of the darkening of thin edges in the published models ("powdered sugar", nubis2015); 0 is none.
         powder: f32 = 0.6, in 0..=1 "";
-        /// How many times more light is absorbed where precipitation is 1 (nubis2015).
+        /// Factor on the absorption in the published models where precipitation is 1 (nubis2015).
         rain_absorption: f32 = 2.5, in 1..=100 "";
     }
 
-    /// The planet and its air.
+    /// The planet, its atmosphere, and the shadows of clouds on both.
     Atmosphere {
-        /// Whether there is air; without it the sky is black, day and night, and sunlight arrives undimmed.
+        /// Whether there is an atmosphere. Without one the sky is black by day and night, and sunlight is not
+        /// attenuated.
         enabled: bool = true;
         /// Radius of the planet (Earth 6 371 000, thesis2018 400 000).
         planet_radius: f32 = 6371000.0, in 10000..=1000000000 "m";
-        /// Haze: amount of aerosol. Each unit is an optical depth of 0.0053 straight up from the ground, at 550 nm as at all
-        /// wavelengths: 1 is air as clear as over the Antarctic, 10 to 20 a clear day (0.05 to 0.1), 94 thick haze (0.5).
+        /// Amount of aerosol. One unit has a vertical optical depth of 0.0053 above the ground, at 550 nm and at all
+        /// other wavelengths. 1 is air as clear as over the Antarctic, 10 to 20 a clear day (optical depth 0.05 to
+        /// 0.1), 94 thick haze (0.5).
         haze: f32 = 1.0, in 0..=100 "";
-        /// How much air stands between the eye and the clouds: 1 is physical, 0 none.
+        /// Strength of the aerial perspective in front of the clouds: 1 is physical, 0 none.
         aerial_perspective: f32 = 1.0, in 0..=10 "";
-        /// Whether clouds cast shadows on the ground that is seen.
+        /// Whether clouds cast shadows on the visible ground.
         ground_shadows: bool = true;
-        /// Whether clouds cast shadows on the air: crepuscular rays.
+        /// Whether clouds cast shadows on the air: light shafts (crepuscular rays).
         beams: bool = true;
-        /// Albedo of the ground.
+        /// Albedo of the ground (linear, Rec. 709 primaries).
         ground_albedo: [f32; 3] = [0.10, 0.12, 0.07], in 0..=1 "";
-        /// Radiance of the night's own light above the air, airglow and stars, which is there by day too: 20.9, 21.6 and 22.6
-        /// magnitudes a square arcsecond in R, V and B (Patat 2003) beside a sun of 10 and of -27.1, -26.74 and -26.09.
+        /// Radiance of the night sky above the atmosphere (airglow and stars), present by day too. The default
+        /// corresponds to a sun of 10: 20.9, 21.6 and 22.6 magnitudes per square arcsecond in R, V and B (Patat 2003)
+        /// against the sun's -27.1, -26.74 and -26.09.
         night: [f32; 3] = [2.7e-8, 2.0e-8, 1.4e-8], in 0..=1000000 "";
     }
 
-    /// The numerical method: how accurately a sky is computed, never how it looks.
+    /// The numerical method: accuracy and cost of a picture. The appearance of the sky is set by `Params` alone.
     Quality {
-        /// View steps straight up.
+        /// Number of view steps of a ray toward the zenith.
         steps_zenith: u32 = 134, in 1..=4096 "";
-        /// View steps toward the horizon.
+        /// Number of view steps of a ray toward the horizon.
         steps_horizon: u32 = 320, in 1..=4096 "";
-        /// How much steps grow with distance: 0 makes all of a ray's steps equal, 1 lets a step be a fixed share of its distance.
+        /// Growth of the view steps with distance: 0 makes all steps of a ray equal, 1 makes a step a fixed fraction
+        /// of its distance.
         step_growth: f32 = 1.0, in 0..=1 "";
-        /// How many steps one step outside cloud is long; on a hit the march goes back.
+        /// Length of a coarse step outside clouds, in view steps. On a hit the march goes back by the coarse step.
         big_step: u32 = 5, in 1..=16 "";
-        /// How far a ray may leap through clear air, beyond `big_step`: as a share of `clouds.shape_scale` (of
-        /// `weather.scale` or two and a half pixels of `weather.map`, if that is less) for each unit that the base shape lacks of
-        /// being cloud. On a hit the march goes back. 0 leaps no farther than `big_step`; none does where that is 1, in grids and
-        /// in rain.
+        /// Sphere-tracing factor for steps through clear air longer than `big_step` (Hart 1996): the step per unit by
+        /// which the base shape falls short of cloud, as a fraction of `clouds.shape_scale` (of `weather.scale`, or
+        /// of 2.5 texels of `weather.map`, if that is less). On a hit the march goes back. 0 limits steps to
+        /// `big_step`. Longer steps are off where `big_step` is 1, in grids and in rain.
         leap: f32 = 0.2, in 0..=1 "";
-        /// Full samples of zero in a row after which samples are cheap again (nubis2015: 6).
+        /// Number of consecutive full samples of zero density before the march takes coarse steps (nubis2015: 6).
         empty_samples: u32 = 6, in 1..=4096 "";
-        /// Light samples toward the sun, besides the far one. Where they spread to the end of the clouds, there is a third more
-        /// for a second deck above the point.
+        /// Number of light samples toward the sun, without the far sample. Where they reach to the end of the clouds
+        /// (`light_distance` 0), points below a second deck take a third more, for that deck.
         light_steps: u32 = 16, in 1..=128 "";
-        /// Share of a pixel's cloud that is lit as one, by the light samples of one place in it: samples in a row are lit
-        /// together once they have gathered more. 0 lights each sample by itself.
+        /// Light-group weight: consecutive view samples are lit as a group, by light samples from one point, once
+        /// their opacity in the pixel exceeds this share. 0 lights each view sample by itself.
         light_share: f32 = 0.15, in 0..=1 "";
-        /// How far the light samples reach; 0 spreads them to where the clouds end.
+        /// Reach of the light samples; 0 extends them to the end of the clouds.
         light_distance: f32 = 0.0, in 0..=100000 "m";
-        /// Whether there is one more light sample, at three times that reach, for shadows from distant clouds (nubis2015).
+        /// Whether a further light sample is taken at three times the reach of the others, for shadows of distant
+        /// clouds (nubis2015).
         far_sample: bool = false;
-        /// Half width of the cone that the light samples are spread over, as a share of its length (nubis2015); 0 looks
-        /// straight at the sun.
+        /// Half-width of the cone of the light samples, as a fraction of its length (nubis2015); 0 places them on a
+        /// straight line to the sun.
         cone: f32 = 0.0, in 0..=1 "";
-        /// Opacity in front of a sample past which its light samples leave out the detail (nubis2015: 0.3). Of those
-        /// that spread to the end of the clouds, the ones that stand for most of a tile of the detail leave it out always.
+        /// Detail cut-off of the light samples: opacity in front of a view sample above which its light samples omit
+        /// the detail noise (nubis2015: 0.3). Light samples that reach to the end of the clouds also omit it wherever
+        /// they stand for most of a tile of the detail noise.
         cheap_light: f32 = 1.0, in 0..=1 "";
-        /// Transmittance at which a ray ends; what is left is scaled away, not lost.
+        /// Transmittance at which a ray ends. Its radiance is then scaled up to full opacity, so that the remaining
+        /// light is not lost.
         min_transmittance: f32 = 0.01, in 0..=0.5 "";
-        /// Largest contrast between neighbouring rays, past which the pixels between them get rays of their own. Of pixels
-        /// less than an eighth of a degree wide one in sixteen is marched first, of a quarter one in four, of wider ones
-        /// every one; 0 marches every one of any width, and 1 none but those, so that an animation follows those alone. What
-        /// is behind the clouds, sky, ground and high clouds seen from below, is then worked out at every fourth of the
-        /// narrowest pixels, and where it bends by a tenth of this, at edges too; 0 works out every one.
+        /// Threshold for adaptive sampling: a pixel is marched if the contrast between neighbouring samples exceeds
+        /// it. 0 marches every pixel; 1 marches only the initial grid and upsamples. The initial grid has one pixel
+        /// in sixteen if pixels are narrower than an eighth of a degree, one in four up to a quarter of a degree, and
+        /// every pixel if they are wider. With 1, `Renderer.animate` reprojects the initial grid alone. The
+        /// background (sky, ground, and high clouds seen from below) is evaluated at every fourth pixel in both
+        /// directions if pixels are narrower than an eighth of a degree, and at every pixel where its second
+        /// difference exceeds a tenth of the threshold and along edges; 0 evaluates every pixel.
         contrast: f32 = 0.3, in 0..=1 "";
-        /// Whether each ray starts at a blue-noise offset of up to one step.
+        /// Whether the start of each ray is jittered by blue noise of up to one view step.
         jitter: bool = true;
-        /// Largest relative change of a pixel when all steps are halved; they are until it is met. It replaces everything
-        /// above by an integration that converges, and sun rays go to the end of the clouds; 0
-        /// marches with the settings above.
+        /// Tolerance of the reference integrator: the steps are halved until no pixel changes by more than this
+        /// relative amount. Above 0 the reference integrator replaces the march with all of its settings, and sun
+        /// rays reach to the end of the clouds. 0 selects the march.
         tolerance: f32 = 0.0, in 0..=1 "";
-        /// Paths traced for each pixel (light model `path`).
+        /// Number of paths per pixel (light model `path`).
         path_samples: u32 = 64, in 2..=1048576 "";
-        /// Most scatterings of a path (light model `path`); 1 is single scattering.
+        /// Maximum number of scattering events of a path (light model `path`); 1 is single scattering.
         path_scatterings: u32 = 4096, in 1..=1048576 "";
     }
 }
 
-/// Everything that a sky looks like.
+/// All parameters of a sky.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[expect(missing_docs, reason = "each block says what it is")]
 pub struct Params {
@@ -459,51 +493,52 @@ pub struct Params {
     pub high_clouds: HighClouds,
     pub light: Light,
     pub atmosphere: Atmosphere,
-    /// Other weathers and their shares of the weather map, each 0 to 1 and 1 together at most; the rest is that of
-    /// `weather`. All cover the same square.
+    /// Further weathers and their weights in the weather map. Each weight is from 0 to 1, their sum at most 1;
+    /// `weather` has the rest. All weathers have the same `extent`, `edge` and `broad_extent`.
     pub weather_mix: Vec<(Weather, f32)>,
-    /// A cloud of the user's own in place of the procedural ones.
+    /// User-supplied extinction grid that replaces the procedural clouds.
     pub volume: Option<Arc<DensityGrid>>,
-    /// Unit vector toward the sun, where `sun` holds the moon's light (moon.rs).
+    /// Unit vector toward the sun, if `sun` holds the moonlight (moon.rs).
     pub(crate) lights_moon: Option<[f64; 3]>,
 }
 
-/// A larger weather map.
+/// Source of a larger weather map.
 #[derive(Clone, Debug, PartialEq)]
 pub enum BroadSource {
     /// Baked from noise.
     Seed(u32),
-    /// The user's.
+    /// User-supplied.
     Own(Arc<Map>),
 }
 
-/// What the larger weather map is made of.
+/// Mixture of the larger weather map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BroadShares {
-    /// Maps and their weights, which are 1 together: the share of a weather times its variety. One that comes with next to
-    /// no weight then leaves the others the bits that they have alone.
+    /// Maps and their weights, normalised to a sum of 1: the weight of a weather times its variety. Normalisation
+    /// keeps the other maps bit-exact when one of almost no weight joins them.
     pub maps: Vec<(BroadSource, f32)>,
-    /// What the texels are multiplied with: the sum of those shares times varieties.
+    /// Factor on the texels: the sum of the weights before normalisation.
     pub total: f32,
-    /// How much the smaller map is bent, for each weight of a baked map: 1 in all where every weather has one.
+    /// Distortion of the smaller map per weight of a baked map. The total is 1 if every weather has a baked map at
+    /// full distortion.
     pub bend: f32,
 }
 
-/// The variety from which on the larger map bends the smaller one in full: the default.
+/// `broad_variety` from which on the larger map distorts the smaller one in full: the default.
 const FULL_BEND: f32 = 0.3;
 
-/// The cover up to which a deck shows nothing: fewer than one texel of noise in ten thousand rises above 1 less twice that.
+/// Coverage up to which a deck is invisible: fewer than one noise texel in ten thousand exceeds 1 - 2 * `UNSEEN`.
 const UNSEEN: f32 = 0.01;
 
-/// Extinction of rain that evaporates at once, and of rain that reaches the ground, 1/m: that of clean air is 1.2e-5
+/// Extinction in 1/m of rain that evaporates at once, and of rain that reaches the ground. Clean air has 1.2e-5
 /// (Rayleigh scattering at 550 nm, sea level).
 const FAINTEST_RAIN: [f32; 2] = [1.5e-6, 1e-5];
 
 constants! {
-    /// Shares of the heaviest rain between which a cloud grows from none to all of the tower of a cumulonimbus.
+    /// Precipitation at which a cumulonimbus starts to grow, and at which its tower is complete.
     const TOWER: [f32; 2] = [0.5, 0.9];
-    /// Share of the heaviest rain from which on a cumulonimbus has an anvil, for an `anvil` of 0, and how much less that
-    /// is for one of 1.
+    /// Precipitation from which on a cumulonimbus has an anvil if `anvil` is 0, and by how much an `anvil` of 1
+    /// lowers it.
     const ANVIL_EDGE: [f32; 2] = [0.6, 0.5];
 }
 
@@ -516,13 +551,14 @@ fn smoothstep(low: f32, high: f32, v: f32) -> f32 {
     x * x * (3.0 - 2.0 * x)
 }
 
-/// How much room a deck of some cover has, before it shows: 0 without any, 1 from `UNSEEN` on.
+/// Fraction of its height range that a deck is given before it becomes visible: 0 at a coverage of 0, 1 from `UNSEEN`
+/// on.
 fn shown(cover: f32) -> f32 {
     smoothstep(0.0, UNSEEN, cover)
 }
 
 impl Params {
-    /// The blocks with their names.
+    /// The blocks by name.
     pub fn blocks(&self) -> [(&'static str, &dyn Block); 11] {
         [
             ("sun", &self.sun),
@@ -539,7 +575,7 @@ impl Params {
         ]
     }
 
-    /// The same, to set them.
+    /// The blocks by name, mutable.
     pub fn blocks_mut(&mut self) -> [(&'static str, &mut dyn Block); 11] {
         [
             ("sun", &mut self.sun),
@@ -556,7 +592,7 @@ impl Params {
         ]
     }
 
-    /// Checks every value, and what no range can say.
+    /// Checks the range of every value, and the constraints between values.
     pub fn check(&self) -> Result<()> {
         for (name, block) in self.blocks() {
             check_block(name, block)?;
@@ -623,12 +659,12 @@ impl Params {
         Ok(())
     }
 
-    /// Whether there are marched clouds at all.
+    /// Whether there are volumetric clouds: procedural or a grid.
     pub fn has_clouds(&self) -> bool {
         self.volume.is_some() || self.clouds.coverage > 0.0 || self.has_upper_clouds()
     }
 
-    /// Whether there is a second deck.
+    /// Whether there is an upper deck.
     pub fn has_upper_clouds(&self) -> bool {
         self.volume.is_none() && self.upper_clouds.coverage > 0.0
     }
@@ -638,29 +674,30 @@ impl Params {
         (self.volume.is_none() || self.high_clouds.with_volume) && self.high_clouds.coverage > 0.0
     }
 
-    /// Whether it can rain.
+    /// Whether there can be precipitation.
     pub fn is_rainy(&self) -> bool {
         self.volume.is_none() && self.clouds.coverage > 0.0 && self.clouds.precipitation > 0.0
     }
 
-    /// Whether rain is seen below the clouds.
+    /// Whether rain is visible below the clouds.
     pub fn has_rain_shafts(&self) -> bool {
         self.rain_reach() > 0.0
     }
 
-    /// Whether a second, larger map shifts the weather.
+    /// Whether the larger weather map is in use.
     pub fn has_broad_weather(&self) -> bool {
         self.volume.is_none() && self.broad_shares().total > 0.0
     }
 
-    /// The weathers of a mixture, or the one, and their weights, which are 1 together.
+    /// The weathers and their weights, which sum to 1.
     fn weathers(&self) -> impl Iterator<Item = (&Weather, f32)> {
         let mixed: f32 = self.weather_mix.iter().map(|(_, share)| share).sum();
         let others = self.weather_mix.iter().map(|(weather, share)| (weather, *share));
         std::iter::once((&self.weather, (1.0 - mixed).max(0.0))).chain(others)
     }
 
-    /// The spot to keep clear, its middle and its radius in m: of a mixture one that grows in its place.
+    /// Centre and radius in m of the region kept clear. Of a mixture: the radius is the weighted mean, the centre the
+    /// mean weighted by weight and radius.
     pub fn clear_spot(&self) -> ([f64; 2], f64) {
         let (mut middle, mut radius) = ([0.0; 2], 0.0);
         for (weather, share) in self.weathers() {
@@ -673,7 +710,7 @@ impl Params {
         if radius > 0.0 { (middle.map(|sum| sum / radius), radius) } else { ([0.0; 2], 0.0) }
     }
 
-    /// What the larger map is made of.
+    /// Mixture of the larger weather map.
     pub fn broad_shares(&self) -> BroadShares {
         let mut shares = BroadShares { maps: Vec::new(), total: 0.0, bend: 0.0 };
         let mut baked = 0.0;
@@ -706,10 +743,10 @@ impl Params {
         shares
     }
 
-    /// The lowest and the highest altitude at which there can be procedural clouds or visible rain, m.
+    /// Lowest and highest altitude in m of procedural clouds and visible rain: the bounds of the march.
     ///
-    /// Continuous in all that can be switched on: steps lie by it, and where it leapt all clouds would change with what is
-    /// switched on beside them.
+    /// Continuous in every parameter that switches a feature on: the view steps are placed between these bounds, so
+    /// that a jump would change all clouds.
     pub fn shell(&self) -> [f32; 2] {
         let lower = [self.rain_base(), self.lower_top()];
         if !self.has_upper_clouds() {
@@ -721,13 +758,13 @@ impl Params {
         [lerp(upper.base, lower[0], shown), lerp(above, lerp(lower[1], above, self.upper_shown()), shown)]
     }
 
-    /// How much room the second deck has.
+    /// Fraction of its height range that the upper deck is given (`shown`).
     pub fn upper_shown(&self) -> f32 {
         shown(self.upper_clouds.coverage)
     }
 
-    /// The highest altitude of the first deck, m: it grows with the towers that the heaviest rain makes, and before its anvils
-    /// spread (`tower` and `anvil` of density.wgsl).
+    /// Highest altitude of the lower deck in m. It grows with the towers of the heaviest precipitation, before anvils
+    /// appear (`tower` and `anvil` of density.wgsl).
     pub fn lower_top(&self) -> f32 {
         let clouds = &self.clouds;
         if !self.is_rainy() {
@@ -740,17 +777,19 @@ impl Params {
         lerp(clouds.top, tallest, grown)
     }
 
-    /// How far rain falls, as a share of its way to the ground: what is thinner than clean air evaporates on its way.
+    /// Fraction of the way to the ground that rain falls. Rain with less extinction than clean air evaporates on the
+    /// way.
     pub fn rain_reach(&self) -> f32 {
         if self.is_rainy() { smoothstep(FAINTEST_RAIN[0], FAINTEST_RAIN[1], self.clouds.rain_extinction) } else { 0.0 }
     }
 
-    /// The lowest altitude of rain where it is heaviest (`rain_below` of density.wgsl), or of the first deck, m.
+    /// Lowest altitude in m of the heaviest rain (`rain_below` of density.wgsl), or of the lower deck.
     fn rain_base(&self) -> f32 {
         self.clouds.base * (1.0 - (self.rain_reach() * self.clouds.precipitation / 0.3).min(1.0))
     }
 
-    /// What the weather map is made of: maps by what they depend on, and their shares, which are 1 together.
+    /// Mixture of the weather map: weathers reduced to the fields that their maps depend on, and their weights, which
+    /// sum to 1.
     pub fn weather_shares(&self) -> Vec<(Weather, f32)> {
         let mut shares: Vec<(Weather, f32)> = Vec::new();
         for (weather, share) in self.weathers() {
@@ -767,7 +806,7 @@ impl Params {
 }
 
 impl Weather {
-    /// The weather with what its map does not depend on at the default.
+    /// The weather with every field that its map does not depend on set to the default.
     fn source(&self) -> Self {
         let default = Self::default();
         match &self.map {
@@ -781,11 +820,11 @@ impl Weather {
 }
 
 impl Quality {
-    /// The numerical methods that have a name. The last three are the published settings of the sources.
+    /// Names of the numerical methods. The last three are the published settings of the sources.
     pub const NAMES: [&str; 8] =
         ["preview", "draft", "balanced", "high", "reference", "nubis2015", "thesis2018", "vsu2022"];
 
-    /// The method called `name`.
+    /// The numerical method of that name.
     pub fn named(name: &str) -> Result<Self> {
         let balanced = Self::default();
         // The published marches: equal steps, light samples near by.
@@ -847,8 +886,9 @@ impl Quality {
         })
     }
 
-    /// Most iterations of the loops of a ray. lavapipe ends loops without a word after 65,535 of them summed over a shader
-    /// (docs/numerics.md); a second deck, which gets a third more light samples (light.wgsl), stays below that from 40,000.
+    /// Maximum number of loop iterations of a ray. lavapipe silently ends loops after 65,535 iterations, summed over
+    /// a shader (docs/numerics.md). A limit of 40,000 leaves room for the third more light samples of an upper deck
+    /// (light.wgsl).
     fn turns(&self) -> u32 {
         // Growing steps may be twice as many (passes/march.wgsl).
         let steps = self.steps_zenith.max(self.steps_horizon) * if self.step_growth > 0.0 { 2 } else { 1 };
@@ -857,18 +897,19 @@ impl Quality {
         2 * steps + groups * (1 + self.light_steps)
     }
 
-    /// Whether the user's grid is read in f32, and not filtered by the hardware in half floats.
+    /// Whether a grid is read in f32 instead of by half-float hardware filtering.
     pub(crate) fn is_precise(&self, params: &Params) -> bool {
         self.tolerance > 0.0 || params.light.model == Model::Path
     }
 
-    /// Most rays through a pixel that is wider than clouds (subrays.wgsl): 16, of which the mean is off by a tenth of that between
-    /// cloud and none, or as many as lavapipe has iterations for, less those of a mean of the phase function.
+    /// Maximum number of rays through a pixel that is wider than clouds (subrays.wgsl): 16, the mean of which is off
+    /// by a tenth of the difference between cloud and clear sky, or as many as lavapipe has iterations for, less
+    /// those of a mean of the phase function.
     pub(crate) fn most_rays(&self) -> f32 {
         (48_000 / self.turns().max(1)).clamp(1, 16) as f32
     }
 
-    /// Checks every value, and what no range can say.
+    /// Checks the range of every value, and the constraints between values.
     pub fn check(&self) -> Result<()> {
         check_block("quality", self)?;
         let turns = self.turns();
@@ -892,7 +933,7 @@ fn check_block(name: &str, block: &dyn Block) -> Result<()> {
     Ok(())
 }
 
-/// A block by the name that Python calls its type: every block of [`Params`], and [`Quality`].
+/// The default block of a Python type name: any block of [`Params`], or [`Quality`].
 pub fn block(type_name: &str) -> Option<Box<dyn Block>> {
     let Params {
         sun,
@@ -928,7 +969,7 @@ pub fn block(type_name: &str) -> Option<Box<dyn Block>> {
     blocks.into_iter().find(|block| block.type_name() == type_name)
 }
 
-/// Where each block starts in the `params` uniform, the last of them `quality`, and the size of the whole, in bytes.
+/// Offset of each block in the `params` uniform, `quality` last, and the size of the whole, in bytes.
 pub fn uniform_layout() -> (Vec<(&'static str, &'static str, usize)>, usize) {
     let (params, quality) = (Params::default(), Quality::default());
     let mut offset = 0;
@@ -943,7 +984,7 @@ pub fn uniform_layout() -> (Vec<(&'static str, &'static str, usize)>, usize) {
     (blocks, offset)
 }
 
-/// The words of the `params` uniform.
+/// Contents of the `params` uniform, as 32-bit words.
 pub fn uniform(params: &Params, quality: &Quality) -> Vec<u32> {
     // Shaders see by the cover whether there are high clouds.
     let mut params = Cow::Borrowed(params);

@@ -1,1 +1,1 @@
-"""Error against time: ``python -m benchmarks --help``. The results are read in docs/accuracy.md."""
+"""Benchmarks of error against time: ``python -m benchmarks --help``, docs/accuracy.md."""

@@ -1,4 +1,4 @@
-"""The command line of the benchmarks."""
+"""Command line of the error and scaling benchmarks."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Measure, write the results, draw them, and bring docs/accuracy.md up to date."""
+    """Measure, write and plot the results, and update docs/accuracy.md."""
     parser = _parser()
     arguments = sys.argv[1:] if arguments is None else list(arguments)
     args = parser.parse_args(arguments)
@@ -55,7 +55,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if not args.plots_only:
         out.mkdir(parents=True, exist_ok=True)
         with warnings.catch_warnings():
-            # The results say so too.
+            # Redundant: the results hold the adapter.
             warnings.filterwarnings("ignore", "no hardware Vulkan adapter")
             _measure(parser, args, out, shlex.join(arguments))
     if find_spec("matplotlib"):

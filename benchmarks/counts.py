@@ -1,8 +1,8 @@
-"""How often a picture reads the textures of its clouds, pixel by pixel: counted, not estimated.
+"""Per-pixel counts of the texture reads of the march.
 
-The march counts its density evaluations (the layer `samples`) and nothing else. Reads are counted
-by a copy of the shaders in which every read counts itself: it lies in a folder of its own, and a
-process of its own reads it (`NUBIS_SHADERS`), so that no shader that makes pictures is slower.
+The march itself counts its density evaluations only (the layer `samples`). Reads are counted by an
+instrumented copy of the shaders in a temporary folder, which a separate process loads
+(`NUBIS_SHADERS`), so that the shaders of ordinary renders stay as fast as they are.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ import numpy.typing as npt
 import nubis
 from benchmarks.reference import ROOT, Size
 
-#: What a march reads for its clouds, by the names of shaders/wgsl/bindings.wgsl.
+#: Textures that the march reads, by their names in shaders/wgsl/bindings.wgsl.
 TEXTURES = (
     "profile_table",
     "broad_map",
@@ -35,14 +35,14 @@ TEXTURES = (
 
 Counts = npt.NDArray[np.uint32]
 
-# `quality.path_samples` means nothing to a march: in the copy it says what is counted, evaluations
-# up to here, then the reads of each texture, then those of all.
+# `quality.path_samples` has no effect on a march. In the copy it selects what is counted:
+# evaluations up to this value, then the reads of each texture, then the reads of all.
 _EVALUATIONS = 1000
 _ALL = _EVALUATIONS + len(TEXTURES)
 
 
 class Job(NamedTuple):
-    """A picture, and what is counted in it: "evaluations", "reads", or the name of a texture."""
+    """A picture, and the quantity to count: "evaluations", "reads", or the name of a texture."""
 
     camera: nubis.Camera
     params: nubis.Params
@@ -51,7 +51,7 @@ class Job(NamedTuple):
 
 
 def count(jobs: Sequence[Job], size: Size) -> list[Counts]:
-    """The counts of each pixel for each picture."""
+    """Per-pixel counts of each job."""
     for job in jobs:
         if job.params.volume is not None or job.params.light.model == "path":
             raise ValueError("only the march through procedural clouds is counted")
@@ -63,7 +63,7 @@ def count(jobs: Sequence[Job], size: Size) -> list[Counts]:
 
 
 def counting_shaders(folder: Path) -> None:
-    """Copy the shaders into a folder, and make each read of the clouds' textures count itself."""
+    """Write a copy of the shaders into a folder that counts each read of `TEXTURES`."""
     source = Path(os.environ.get("NUBIS_SHADERS") or ROOT / "shaders" / "wgsl")
     shutil.copytree(source, folder, dirs_exist_ok=True)
     found, lines = [], []

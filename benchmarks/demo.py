@@ -1,4 +1,4 @@
-"""How smoothly the demo flies: the times from picture to picture, on a display without a screen.
+"""Frame times of flights in the demo, on a virtual display (Xvfb).
 
 python -m benchmarks.demo
 """
@@ -20,14 +20,14 @@ from benchmarks.reference import ROOT
 
 RESULTS = Path(__file__).parent / "results"
 SCENES = "fair_weather", "sunset", "above", "storm"
-#: Frames a second that are wanted: the demo's default on a processor, and more.
+#: Requested frames per second: the default of the demo on a CPU, and twice that.
 RATES = 10, 20
 _LINE = re.compile(r"median (\d+), 95 % (\d+), worst (\d+); (\d+) x (\d+) pixels")
 
 
 @contextmanager
 def display(size: str) -> Iterator[str]:
-    """A display of Xvfb's."""
+    """Start Xvfb and yield the name of its display."""
     command = ["Xvfb", "-displayfd", "1", "-screen", "0", f"{size}x24", "-nolisten", "tcp"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as server:
         assert server.stdout is not None
@@ -36,7 +36,7 @@ def display(size: str) -> Iterator[str]:
 
 
 def fly(scene: str, rate: int, frames: int, size: str) -> dict[str, Any]:
-    """A flight ahead through a scene."""
+    """Frame times in ms of a forward flight through a scene."""
     demo = ROOT / "target" / "release" / "clouds_demo"
     arguments = ["--scene", scene, "--rate", str(rate), "--frames", str(frames), "--size", size]
     with display(size) as name:
@@ -54,7 +54,7 @@ def fly(scene: str, rate: int, frames: int, size: str) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Measure, and write benchmarks/results/demo.json and docs/demo.md."""
+    """Measure, write benchmarks/results/demo.json, and update docs/demo.md."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.demo", description=__doc__)
     parser.add_argument("--frames", type=int, default=200)
     parser.add_argument("--size", default="1280x720", metavar="WxH")

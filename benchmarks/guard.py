@@ -1,7 +1,7 @@
-"""Checksums of pictures, to show that a change of the code changes none of them.
+"""Checksums of pictures, to verify that a refactoring is bit-exact.
 
-`python -m benchmarks.guard --store FILE` before the change, `--check FILE` after it, on the same
-adapter and driver: bytes differ between those.
+Run `python -m benchmarks.guard --store FILE` before the change and `--check FILE` after it, on the
+same adapter and driver: pictures of different adapters and drivers differ in their bytes.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ import nubis
 
 QUALITIES = "preview", "draft", "balanced", "high", "nubis2015", "thesis2018", "vsu2022"
 SIZES = (96, 54), (256, 144)
-#: The slow integrators, and qualities whose frames are all stills.
+#: Size for the slow integrators, and for light models and phase functions.
 SMALL = 24, 16
 FLIGHT = 160, 90
 FRAMES = 20
@@ -31,7 +31,7 @@ Case = tuple[str, Callable[[], Any]]
 
 
 def checksum(value: Any) -> str:
-    """Of an array, or of several by name."""
+    """SHA-256 of an array, or of several arrays by name, shortened to 24 digits."""
     digest = hashlib.sha256()
     if isinstance(value, tuple):
         value = dict(zip(map(str, range(len(value))), value, strict=True))
@@ -47,7 +47,7 @@ def layers(scene: str, quality: str, size: tuple[int, int], **changes: Any) -> A
 
 
 def flight(scene: str, quality: str, size: tuple[int, int]) -> Any:
-    """Ahead, up and to the side, as winds blow and the sun sets; a jump in the middle."""
+    """Frames of a flight forward, up and turning, with wind, a setting sun, and one cut."""
     camera, params = nubis.scenes[scene]
     eye, forward = np.array(camera.eye), np.array(camera.forward)
 
@@ -68,7 +68,7 @@ def flight(scene: str, quality: str, size: tuple[int, int]) -> Any:
 
 
 def others() -> Iterator[Case]:
-    """What scenes have nothing of."""
+    """Cases that no scene of `nubis.scenes` covers."""
     rng = np.random.default_rng(7)
     grid = nubis.DensityGrid(
         rng.uniform(0, 0.05, (12, 16, 16)).astype(np.float32) ** 2 * 40,

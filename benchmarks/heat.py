@@ -1,12 +1,12 @@
-"""What each pixel costs, as in thesis2018's figure 39: optimisation after optimisation, one scale.
+"""Heat maps of the cost per pixel, as in thesis2018, figure 39: one panel per optimisation.
 
     python -m benchmarks.heat --scene fair_weather
 
-The cost is the texture reads of a pixel's march through the clouds, as in the source; bakes and
-the sky behind the clouds are not in it. Reads are counted (benchmarks/counts.py). Two of the
-thesis' optimisations cannot be switched off in our march, so the panels without them are sums of
-counts: without A every step pays the light samples that a lit one is counted to pay, without C
-every view step reads everything. With equal steps, none of them big, that is exact.
+The cost of a pixel is the number of texture reads of its march, as in the source, without bakes and
+the background. Reads are counted (benchmarks/counts.py). Optimisations A and C of the thesis cannot
+be switched off in this march, so their panels are computed from counts: without A every step has
+the light samples that a lit step has, without C every view step reads all textures. The result is
+exact for equal steps without coarse steps.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ from benchmarks.counts import Job
 from benchmarks.reference import Size
 
 RESULTS = Path(__file__).parent / "results"
-#: Reads that are white, as in the source.
+#: Number of reads that is shown as white, as in the source.
 WHITE = 1000
-#: Reads of a density evaluation: weather, shape, curl, detail.
+#: Reads per density evaluation: weather, shape, curl, detail.
 FULL = 4
 
 
@@ -45,12 +45,12 @@ class Panel:
 
 
 def light_reads(quality: nubis.Quality) -> int:
-    """Reads at a lit step of a published quality; the far sample leaves out curl and detail."""
+    """Light-sample reads of a lit step of a published quality; the far one has no detail."""
     return FULL * quality.light_steps + 2 * quality.far_sample
 
 
 def stages() -> dict[str, nubis.Quality]:
-    """The thesis' march without and with what our march can switch off."""
+    """Qualities of the optimisation stages of the thesis that this march can switch off."""
     whole = nubis.quality("thesis2018")
     return {
         "off": whole.replace(min_transmittance=0.0, big_step=1),
@@ -60,7 +60,7 @@ def stages() -> dict[str, nubis.Quality]:
 
 
 def ours() -> dict[str, nubis.Quality]:
-    """What comes after: the named qualities and what they are made of."""
+    """Qualities of the panels after the thesis: named qualities, without and with upsampling."""
     found = {}
     for name in "draft", "balanced":
         quality = nubis.quality(name)
@@ -72,11 +72,10 @@ def ours() -> dict[str, nubis.Quality]:
 
 
 def panels(camera: nubis.Camera, params: nubis.Params, size: Size) -> list[Panel]:
-    """All stages of a picture."""
-    # As in the source, which has one weather map and one detail: a full evaluation reads four
-    # textures.
+    """Panels of all stages."""
+    # The source has one weather map and one detail noise: a full evaluation reads four textures.
     params = params.with_(**{"weather.broad_variety": 0.0, "clouds.fine_detail": 0.0})
-    # Without a sun there are no light samples, and the view steps are the same.
+    # Without irradiance there are no light samples; view steps are unchanged.
     night = params.with_(**{"sun.irradiance": (0.0, 0.0, 0.0)})
     by_name = stages()
     jobs = {
@@ -104,7 +103,7 @@ def panels(camera: nubis.Camera, params: nubis.Params, size: Size) -> list[Panel
 
 
 def rows(found: Sequence[Panel]) -> list[dict[str, Any]]:
-    """Numbers of the panels: the mean, its share of the first, and how many pixels are white."""
+    """Statistics of the panels: mean, share of the first, maximum, fraction of white pixels."""
     first = found[0].reads.mean()
     return [
         {
@@ -119,14 +118,14 @@ def rows(found: Sequence[Panel]) -> list[dict[str, Any]]:
 
 
 def draw(path: Path, picture: npt.NDArray[Any], found: Sequence[Panel]) -> None:
-    """The picture, and the panels in one scale."""
+    """Plot the picture and the panels, with one colour scale."""
     import matplotlib
 
     matplotlib.use("Agg")
     from matplotlib import pyplot
 
     figure, grid = pyplot.subplots(5, 2, figsize=(7.5, 10.6), layout="constrained")
-    # The thesis' stages, the picture, then a row for each of our qualities.
+    # Order: stages of the thesis, the picture, a row per named quality.
     places = list(grid.flat)
     axes = places.pop(5)
     axes.imshow(nubis.to_srgb8(picture)[..., :3])
@@ -144,7 +143,7 @@ def draw(path: Path, picture: npt.NDArray[Any], found: Sequence[Panel]) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Count, draw, write the results, and bring docs/speed.md up to date."""
+    """Count, plot, write the results, and update docs/speed.md."""
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks.heat", description="What each pixel costs."
     )

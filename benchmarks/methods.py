@@ -1,4 +1,4 @@
-"""What is measured: the named qualities, and families of methods that differ in one knob."""
+"""Measured methods: named qualities, and families of methods that differ in one setting."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ PRESETS = "draft", "balanced", "high", "nubis2015", "thesis2018", "vsu2022"
 
 @dataclass(frozen=True, kw_only=True)
 class Method:
-    """A numerical method; with `divisor` the picture is rendered that many times smaller."""
+    """A numerical method; the resolution is divided by `divisor`."""
 
     name: str
     family: str
-    value: int  # of the family's knob
+    value: int  # of the setting of the family
     quality: nubis.Quality
     divisor: int = 1
 
@@ -46,7 +46,7 @@ def _resolution(base: str, divisor: int) -> Method:
 
 
 def full() -> list[Method]:
-    """All methods. A family's coarsest setting comes first; `finest` knows the last."""
+    """All methods. Members of a family are in order from coarse to fine."""
     found = [Method(name=p, family=p, value=0, quality=nubis.quality(p)) for p in PRESETS]
     found += [_view_steps("balanced", n) for n in (20, 40, 80, 160, 320, 640, 1280)]
     found += [_view_steps("high", n) for n in (32, 64, 128, 256, 512)]
@@ -57,7 +57,7 @@ def full() -> list[Method]:
 
 
 def quick() -> list[Method]:
-    """Enough of them to see that the program works."""
+    """A small selection of methods, as a smoke test."""
     found = [Method(name=p, family=p, value=0, quality=nubis.quality(p)) for p in PRESETS[:2]]
     found += [_view_steps("draft", n) for n in (24, 96)]
     found += [_light_steps("draft", n) for n in (1, 5)]

@@ -1,4 +1,4 @@
-"""How far a picture is from the reference. Each number is explained in docs/accuracy.md."""
+"""Error metrics against the reference, as defined in docs/accuracy.md."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ import numpy.typing as npt
 
 Layers = dict[str, npt.NDArray[Any]]
 
-#: Optical depth of the reference above which a pixel counts as cloud. Pixels of clear sky are exact
-#: in every method, and would dilute the mean.
+#: Optical depth of the reference above which a pixel counts as cloud. Clear sky is exact with every
+#: method and would dilute the mean.
 CLOUD = 1e-3
 
 
 def errors(test: Layers, reference: Layers) -> dict[str, float | None]:
-    """Return every error of the layers of a picture."""
+    """Return all error metrics of the layers of a picture."""
     x, r = (layers["radiance"].astype(float) for layers in (test, reference))
     t, t_ref = (layers["transmittance"].astype(float) for layers in (test, reference))
     cloud = t_ref < np.exp(-CLOUD)
@@ -33,24 +33,24 @@ def errors(test: Layers, reference: Layers) -> dict[str, float | None]:
 
 
 def composed(layers: Layers, sky: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
-    """The picture: clouds in front of a sky, which is the reference's own for every method."""
+    """Composite of clouds over a sky: that of the reference, for every method."""
     picture = layers["radiance"] + layers["transmittance"][..., None] * sky
     return picture.astype(np.float32)
 
 
 def flip(test: npt.NDArray[Any], reference: npt.NDArray[Any]) -> float | None:
-    """Mean HDR-FLIP at its default 67 pixels a degree, None where it is not installed."""
+    """Mean HDR-FLIP at its default of 67 pixels per degree, None if it is not installed."""
     if find_spec("flip_evaluator") is None:
         return None
     import flip_evaluator
 
-    # It takes the exposures from its first argument, so they are the same for all methods.
+    # Exposures come from the first argument, and are the same for all methods.
     _, mean, _ = flip_evaluator.evaluate(reference, test, "HDR", applyMagma=False)
     return float(mean)
 
 
 def enlarge(image: npt.NDArray[Any], factor: int) -> npt.NDArray[np.float64]:
-    """Bilinear between pixel centres, the border's own value beyond them (thesis2018)."""
+    """Bilinear upsampling between pixel centres, clamped at the border (thesis2018)."""
     for axis in (0, 1):
         n = image.shape[axis]
         at = np.clip((np.arange(n * factor) + 0.5) / factor - 0.5, 0, n - 1)

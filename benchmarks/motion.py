@@ -1,7 +1,7 @@
-"""How far frames of `animate` are from the truth, beside stills of the same quality.
+"""Error of frames of `animate`, in comparison with stills of the same quality.
 
-Five scenes, five ways to move. Every frame that is looked at is compared with a picture in `high`
-of the same shot; so is a still of the frames' own quality.
+Five scenes and five motions are measured. The reference of a frame is a still of the same shot in
+`high`; a still of the quality of the frame is compared with it, too.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ RESULTS = Path(__file__).parent / "results"
 
 SCENES = "fair_weather", "stratocumulus", "storm", "sunset", "above"
 MOTIONS = "held", "flight", "turn", "time lapse", "sun"
-#: Frames that are looked at; 18 is past the 16 in which every pixel has had its ray.
+#: Indices of the measured frames; every pixel has been marched after 16 frames.
 FRAMES = 9, 18
 TRUTH = "high"
 
 
 def shots(scene: str, motion: str) -> Iterator[Shot]:
-    """Held; forward at 5 m a frame; 5 degrees to the right; a minute; the sun by 0.25 degrees."""
+    """Shots of a motion. Per frame: none, 5 m ahead, 5 degrees right, 60 s, sun up 0.25 degrees."""
     camera, params = nubis.scenes[scene]
     params = params.with_(**{"high_clouds.coverage": 0.0, "sun.visible": False})
     eye, forward = np.array(camera.eye), np.array(camera.forward)
@@ -60,13 +60,13 @@ def shots(scene: str, motion: str) -> Iterator[Shot]:
 
 
 def rmse(test: Picture, reference: Picture) -> float:
-    """Of radiance, over the root mean square of the reference."""
+    """RMSE of the radiance, relative to the root mean square of the reference."""
     x, r = test[..., :3].astype(float), reference[..., :3].astype(float)
     return float(np.sqrt(np.sum((x - r) ** 2) / np.sum(r**2)))
 
 
 def darkened(frame: Picture, still: Picture) -> int:
-    """Pixels darker than half of the darkest of the nine around them in the still."""
+    """Number of pixels darker than half the minimum of the still in a 3 x 3 neighbourhood."""
     height, width = still.shape[:2]
     padded = np.pad(still[..., :3].max(axis=-1), 1, mode="edge")
     around = [padded[y : y + height, x : x + width] for x in range(3) for y in range(3)]
@@ -74,7 +74,7 @@ def darkened(frame: Picture, still: Picture) -> int:
 
 
 def row(size: Size, scene: str, motion: str, quality: str, strip: list[Picture]) -> Row:
-    """Errors of one motion through one scene; its last frames are added to `strip`."""
+    """Errors of one motion in one scene; its last three frames are appended to `strip`."""
     film = list(shots(scene, motion))
     other = nubis.Renderer(*size, quality=quality)
     truth = nubis.Renderer(*size, quality=TRUTH)
@@ -95,7 +95,7 @@ def row(size: Size, scene: str, motion: str, quality: str, strip: list[Picture])
 
 
 def run(size: Size, qualities: tuple[str, ...], plots: Path | None = None) -> list[Row]:
-    """All rows; with `plots`, the last three frames of every motion as strips, motion.png."""
+    """All rows. With `plots`, motion.png shows the last three frames of every motion."""
     rows, strips = [], []
     work = [(s, m, q) for q in qualities for s in SCENES for m in MOTIONS]
     for scene, motion, quality in tqdm(work, unit="flight", disable=None):
@@ -110,7 +110,7 @@ def run(size: Size, qualities: tuple[str, ...], plots: Path | None = None) -> li
 
 
 def main() -> None:
-    """Measure, and write benchmarks/results/motion.json and its table in docs/accuracy.md."""
+    """Measure, write benchmarks/results/motion.json, and update docs/accuracy.md."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.motion", description=__doc__)
     parser.add_argument("--size", default="480x270", metavar="WxH")
     parser.add_argument("--qualities", nargs="+", default=["draft", "balanced"])

@@ -1,8 +1,9 @@
-"""Fits the constants of the light model ``"octaves"`` to the path tracer, and says what is left.
+"""Fit of the constants of the light model ``"octaves"`` to the path tracer, and its residual error.
 
     python -m benchmarks.octaves
 
-Clouds of the scenes on grids, four suns, two phase functions, black surroundings: the sun alone.
+Cases: clouds of three scenes on grids, four positions of the sun, two phase functions. The sun is
+the only light; the surroundings are black.
 """
 
 from __future__ import annotations
@@ -28,16 +29,16 @@ Array = npt.NDArray[np.floating[Any]]
 
 SIZE = 32, 24
 TILE = 4
-#: Where the sun stands as seen by the camera, which looks north: azimuth and elevation.
+#: Azimuth and elevation of the sun; the camera looks north.
 SUNS = {"behind": (190.0, 35.0), "beside": (80.0, 30.0), "against": (10.0, 25.0), "above": (0, 75)}
 G = 0.6, 0.85
-#: Cloud: scene, and the width of its box in metres.
+#: Scene of each cloud, and the width of its box in metres.
 CLOUDS = {
     "cumulus": ("fair_weather", 3000.0),
     "deck": ("stratocumulus", 4000.0),
     "tower": ("storm", 5000.0),
 }
-#: Shares of the extinction for which the sun's light is rendered; between them it is interpolated.
+#: Extinction factors for which sunlight is rendered; it is interpolated between them.
 SHARES = np.geomspace(1.0, 0.002, 14)
 COUNTS = 3, 8
 USUAL = 0.5, 0.5, 0.5
@@ -48,14 +49,14 @@ class Case:
     name: str
     camera: nubis.Camera
     params: nubis.Params
-    truth: Array  # means of tiles
-    noise: Array  # standard errors
-    light: Array  # by share and tile: the integral of the weight times exp(-share depth) / 4 pi
+    truth: Array  # tile means of the reference
+    noise: Array  # their standard errors
+    light: Array  # by factor and tile: integral of weight * exp(-factor * depth) / 4 pi
     phase: Array  # cosine of the scattering angle by tile
 
 
 def grid(name: str) -> nubis.DensityGrid:
-    """The densest cloud of a scene within 12 km, on a grid."""
+    """The cloud of largest column density of a scene within 12 km, sampled on a grid."""
     scene, width = CLOUDS[name]
     params = nubis.scenes[scene][1]
     base, top = params.clouds.base, params.clouds.top
@@ -76,13 +77,13 @@ def grid(name: str) -> nubis.DensityGrid:
 
 
 def tiles(image: Array) -> Array:
-    """Means of square tiles, in a row."""
+    """Means of square tiles, flattened."""
     height, width = image.shape[0] // TILE, image.shape[1] // TILE
     return image.reshape(height, TILE, width, TILE).mean(axis=(1, 3), dtype=np.float64).ravel()
 
 
 def cases(samples: int) -> list[Case]:
-    """Trace the paths, and render what the fit needs."""
+    """Path-traced references of all cases, and the renders that the fit needs."""
     found = []
     for name in CLOUDS:
         volume = grid(name)
@@ -129,7 +130,7 @@ def cases(samples: int) -> list[Case]:
 
 
 def _sunlight(camera: nubis.Camera, params: nubis.Params, share: float) -> Array:
-    """What is seen if sunlight dies out with a share of the extinction and scatters evenly."""
+    """Radiance of isotropic single scattering, with a factor on the extinction toward the sun."""
     sky = params.with_(
         **{
             "light.model": "nubis2015",
@@ -159,7 +160,7 @@ def _sun(azimuth: float, elevation: float) -> Array:
 
 
 def model(case: Case, constants: Array, count: int) -> Array:
-    """The tiles as ``"octaves"`` would render them."""
+    """Tiles of the model ``"octaves"`` for some constants, from the renders of a case."""
     a, b, c = constants
     g = case.params.light.g
     total = np.zeros(case.truth.shape)
@@ -175,7 +176,7 @@ def model(case: Case, constants: Array, count: int) -> Array:
 
 
 def error(image: Array, case: Case) -> dict[str, float]:
-    """Relative error of tiles without the truth's noise, RMSE over the mean, bias of the mean."""
+    """Relative RMS error less the noise of the reference, RMSE over the mean, relative bias."""
     relative = np.mean(((image - case.truth) / case.truth) ** 2 - (case.noise / case.truth) ** 2)
     return {
         "rms_relative": float(np.sqrt(max(relative, 0.0))),
@@ -185,7 +186,7 @@ def error(image: Array, case: Case) -> dict[str, float]:
 
 
 def fit(found: list[Case], count: int) -> Array:
-    """The constants of the least RMSE over the mean, over all cases."""
+    """Constants that minimise the mean square of the relative RMSE over all cases."""
 
     def loss(logits: Array) -> float:
         constants = 1 / (1 + np.exp(-logits))
@@ -199,7 +200,7 @@ def fit(found: list[Case], count: int) -> Array:
 
 
 def rendered(case: Case, constants: Array, count: int) -> dict[str, float]:
-    """The error of the real thing, rendered."""
+    """Error metrics of a render with the model ``"octaves"``."""
     names = "octave_scattering", "octave_extinction", "octave_phase"
     values = {f"light.{n}": float(v) for n, v in zip(names, constants, strict=True)}
     params = case.params.with_(**values, **{"light.model": "octaves", "light.octaves": count})

@@ -1,4 +1,4 @@
-"""How far the qualities are from other programs, on the clouds of tests/test_oracle.py.
+"""Errors of the qualities against other programs, on the cases of tests/test_oracle.py.
 
 python -m benchmarks.oracle
 """
@@ -19,7 +19,7 @@ sys.path.insert(0, str(reference.ROOT / "tests"))
 import test_oracle
 
 QUALITIES = "reference", "high", "balanced"
-# Paths a pixel: the standard error of the mean is about a quarter of a percent at most.
+# Paths per pixel: the standard error of the mean is at most about a quarter of a percent.
 PATHS = {"tau_60": 4096, "tau_20": 768}
 
 

@@ -1,6 +1,6 @@
-"""Writes the results into docs/accuracy.md and docs/speed.md, between markers.
+"""Generation of the results in docs/accuracy.md, docs/speed.md and docs/demo.md, between markers.
 
-Tables, and all prose with numbers.
+All tables and all prose with measured numbers are generated.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ DEMO = PAGE.with_name("demo.md")
 
 
 def write(folder: Path, page: Path = PAGE) -> None:
-    """Bring the page up to date with the results in `folder`; the rest of it stays as it is."""
+    """Update the results of docs/accuracy.md from `folder`; text outside markers is unchanged."""
     text = page.read_text()
     blocks = {}
     if (results := _read(folder, "results.json")) is not None:
@@ -50,7 +50,7 @@ def write(folder: Path, page: Path = PAGE) -> None:
 
 
 def write_speed(folder: Path, page: Path = SPEED) -> None:
-    """The same for docs/speed.md."""
+    """Update the results of docs/speed.md from `folder`."""
     blocks = {}
     if (found := _read(folder, "profile.json")) is not None:
         blocks["profile"] = _about(found["header"]) + _load(found) + "\n\n" + profile(found)
@@ -67,7 +67,7 @@ def write_speed(folder: Path, page: Path = SPEED) -> None:
 
 
 def write_demo(folder: Path, page: Path = DEMO) -> None:
-    """The same for docs/demo.md."""
+    """Update the results of docs/demo.md from `folder`."""
     if (found := _read(folder, "demo.json")) is not None:
         block = _about(found["header"]) + "\n\n" + _flights(found["rows"])
         page.write_text(_filled(page.read_text(), {"flights": block}))
@@ -98,7 +98,7 @@ def _flights(rows: list[Row]) -> str:
 
 
 def _against(found: Row) -> str:
-    """How many times faster, scene by scene, and in the geometric mean."""
+    """Speed-up over the published methods, by scene and as geometric mean."""
     ratios = found["ratios"]
     names = list(dict.fromkeys(row["published"] for row in ratios))
     times = {(row["scene"], row["method"]): row for row in found["presets"]}
@@ -196,7 +196,7 @@ def _filled(text: str, blocks: dict[str, str]) -> str:
 
 
 def fill(text: str, name: str, block: str) -> str:
-    """Put `block` between the markers called `name`."""
+    """Replace the text between the markers `name` by `block`."""
     begin, end = f"<!-- begin {name} -->", f"<!-- end {name} -->"
     if text.count(begin) != 1 or text.count(end) != 1:
         raise ValueError(f"the page needs the markers {begin} and {end}, once each")
@@ -322,9 +322,9 @@ def _reading(rows: list[Row]) -> str:
 
 
 def _limits(base: str, means: list[Row]) -> list[str]:
-    """What the error of a quality is made of: which knob takes most of it away."""
+    """Error budget of a quality: the setting whose refinement reduces the error most."""
     start = next((m for m in means if m["method"] == base), None)
-    families = {m["family"]: m for m in means}  # the last of each is its finest
+    families = {m["family"]: m for m in means}  # the last member is the finest
     view, light = families.get(f"{base}: view steps"), families.get(f"{base}: light steps")
     lines = []
     if start and view and light:
@@ -419,7 +419,7 @@ def _table_of_sweeps(sweeps: Iterable[Row]) -> str:
 
 
 def _note(sweep: Row, pixels: int, clock: str) -> str:
-    """Whether it is a line, and what the time follows."""
+    """Linearity of a sweep, in its setting and in density evaluations."""
     rows = sweep["rows"]
     times = [row[clock] for row in rows]
     r2, by_evaluations, in_step = (
@@ -438,7 +438,7 @@ def _note(sweep: Row, pixels: int, clock: str) -> str:
 
 
 def _cost(row: Row, pixels: int) -> float:
-    """Nanoseconds an evaluation."""
+    """Nanoseconds per density evaluation."""
     return float(1e9 * row["seconds"] / row["evaluations"] / pixels)
 
 
@@ -489,7 +489,7 @@ def _resolutions(sweeps: dict[str, Row]) -> list[str]:
 
 
 def _factors(rows: list[Row]) -> str:
-    """How much each of three factors multiplies the time, the others being equal (table 6)."""
+    """Growth of the time by each of three factors, the others fixed (vsu2022, table 6)."""
 
     def effect(name: str, key: str) -> float:
         others = [n for n in ("steps", "coverage", "light_steps") if n != name]
@@ -540,7 +540,7 @@ def _switches(rows: list[Row]) -> str:
 
 
 def _octaves(octaves: Row) -> str:
-    """What is left of the error of the light model "octaves"."""
+    """Residual error of the light model "octaves"."""
 
     def line(row: Row) -> list[str]:
         constants = ", ".join(f"{v:.2f}" for v in row["constants"])
@@ -564,7 +564,7 @@ def _octaves(octaves: Row) -> str:
 
 
 def _oracle(oracle: Row) -> str:
-    """How far the qualities are from other programs."""
+    """Errors of the qualities against other programs."""
     qualities = [key for key in oracle["exact"][0] if key != "case"]
 
     def line(row: Row) -> list[str]:
@@ -637,7 +637,7 @@ def _load(found: Row) -> str:
 
 
 def profile(found: Row) -> str:
-    """Tables of the frames: passes, and the reads of the march at the price of reads alone."""
+    """Tables of profiled frames: pass times, and texture reads of the march with their cost."""
     pixels = found["header"]["size"][0] * found["header"]["size"][1]
     software = found["header"]["adapter"]["kind"] == "cpu"
     clock = "processor" if software else "device"
@@ -687,7 +687,7 @@ def _frame(frame: Row, read_ns: dict[str, float] | None, pixels: int, clock: str
 
 
 def memory(found: Row) -> str:
-    """What a renderer holds on the GPU after the first of the frames."""
+    """Table of the GPU memory of a renderer after the first frame."""
     held = found["frames"][0]["memory"]
     width, height = found["header"]["size"]
     lines = [(f"`{name}`", owner, _bytes(size)) for owner, name, size in held]

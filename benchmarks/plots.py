@@ -1,4 +1,4 @@
-"""The results as pictures. Importing this needs nothing; drawing needs matplotlib."""
+"""Plots of the results. Plotting requires matplotlib; importing this module does not."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from benchmarks.measure import Row
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Okabe and Ito's colours, which the colour-blind can tell apart; markers tell the same.
+# Colour-blind safe palette of Okabe and Ito; markers carry the same information.
 COLOURS = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#56B4E9", "#8C6D00"
 MARKERS = "o", "s", "^", "D", "v", "P", "X"
 
@@ -27,7 +27,7 @@ ERROR = "relative RMSE of the clouds' radiance"
 
 
 def draw(folder: Path) -> list[Path]:
-    """Draw all that lies in `folder`; return the files."""
+    """Plot all results in `folder`; return the files."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -52,9 +52,9 @@ def draw(folder: Path) -> list[Path]:
 
 
 def geometric_mean(rows: Iterable[Row]) -> list[Row]:
-    """Of times, evaluations and errors over the scenes: a row for each method, in their order.
+    """Geometric means over the scenes of times, evaluations and errors: one row per method.
 
-    Biases are averaged, of set-ups it is the median and of `t_max` the largest.
+    Bias is the arithmetic mean, set-up time the median, `t_max` the maximum.
     """
     by_method: dict[str, list[Row]] = {}
     for row in rows:
@@ -75,7 +75,7 @@ def geometric_mean(rows: Iterable[Row]) -> list[Row]:
 
 
 def pareto(rows: Iterable[Row], x: str = "seconds", y: str = "rel_rmse") -> list[Row]:
-    """The rows that no other row beats in both `x` and `y`, by rising `x`."""
+    """Pareto front: rows that no other row beats in both `x` and `y`, in ascending order of `x`."""
     front: list[Row] = []
     for row in sorted(rows, key=lambda row: (row[x], row[y])):
         if not front or row[y] < front[-1][y]:
@@ -84,7 +84,7 @@ def pareto(rows: Iterable[Row], x: str = "seconds", y: str = "rel_rmse") -> list
 
 
 def is_preset(row: Row) -> bool:
-    """Whether a row is a named quality, not a member of a family."""
+    """Whether a row is a named quality instead of a member of a family."""
     return bool(row["method"] == row["family"])
 
 
@@ -126,14 +126,14 @@ def _errors(path: Path, title: str, rows: list[Row], x: str) -> Path:
 
 
 def _name_presets(axes: Axes, presets: list[Row], x: str) -> None:
-    """Circles with names, each on the side where it is farthest from the other ones."""
+    """Labelled circles of the named qualities; labels are placed away from other marks."""
     at = np.array([[row[x], row["rel_rmse"]] for row in presets])
     axes.plot(*at.T, "o", ms=9, mfc="none", mec="black", mew=1.5, zorder=5)
     at = axes.transData.transform(at)
     taken: list[Any] = []
     for i, row in enumerate(presets):
         others = [*np.delete(at, i, axis=0), *taken]
-        # A name is about three times as wide as high.
+        # A label is about three times as wide as high.
         shape = np.array([1 / 3, 1])
         sides = np.array([[0, 16], [0, -16], [48, 0], [-48, 0]])
         room = [
@@ -169,7 +169,7 @@ def _shapes(path: Path, sweeps: Sequence[Row]) -> Path:
     for axes, sweep in zip(grid.flat, single, strict=False):
         _sweep(axes, sweep, COLOURS[0], MARKERS[0], "measured")
         if sweep["published_ms"]:
-            # The published times, scaled so that both have the same mean: only shapes compare.
+            # Published times are scaled to the same mean: only the shapes are comparable.
             x, y = np.array(sweep["published_ms"]).T
             mean = np.mean([1000 * row["seconds"] for row in sweep["rows"]])
             axes.plot(x, y * mean / y.mean(), "x--", color=COLOURS[3], label="published, scaled")

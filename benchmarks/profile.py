@@ -1,11 +1,11 @@
-"""Where the time of a frame goes: passes, density evaluations, texture reads, memory.
+"""Profile of a frame: pass times, density evaluations, texture reads, memory.
 
     python -m benchmarks.profile --scenes fair_weather --quality balanced --size 1280x720
 
-What one read of a texture takes is measured on the same adapter by loops of nothing but reads
-(shaders/wgsl/read_cost.wgsl). All reads of a frame at that price are a bound that the march could
-meet only if it did nothing else. On a software adapter both are in processor time of all threads,
-which is nearly the same whatever else runs on the machine; the clock is not.
+The cost of one texture read is measured on the same adapter by loops of reads alone
+(shaders/wgsl/read_cost.wgsl). The number of reads of a frame times that cost is a lower bound of
+the time of the march. On a software adapter both are CPU time of all threads, which hardly depends
+on other load of the machine, as wall-clock time does.
 """
 
 from __future__ import annotations
@@ -28,21 +28,22 @@ from benchmarks.measure import Row
 from benchmarks.reference import Size
 
 RESULTS = Path(__file__).parent / "results" / "profile.json"
-#: The passes that read the textures of the clouds.
+#: Passes that read the cloud textures.
 MARCH = "march", "march_list"
 
 
 def read_costs(repeats: int = 10) -> dict[str, float] | None:
-    """Nanoseconds that one read of each texture adds; None where the adapter has no timestamps.
+    """Nanoseconds per read of each texture, or None on an adapter without timestamps.
 
-    Neighbours read neighbouring texels, and rays go on by about a texel, as in a march of near
-    clouds. The finest mips are read. The best of `repeats` counts, less that of an empty loop.
+    Neighbouring invocations read neighbouring texels, and rays advance by about a texel, as in a
+    march of near clouds. Reads are from the finest mip level. The result is the minimum of
+    `repeats` runs less that of an empty loop.
     """
     renderer = nubis.Renderer(1, 1)
     software = renderer.adapter.kind == "cpu"
     rays, reads = (1 << 14 if software else 1 << 19), 512
     rng = np.random.default_rng(1)
-    groups = rng.uniform(0, 40, (rays // 64, 1, 3))  # inside of every texture
+    groups = rng.uniform(0, 40, (rays // 64, 1, 3))  # within every texture
     beside = 0.25 * np.arange(64)[:, None] * [1.0, 0.0, 0.0]
     starts = np.concatenate([groups + beside, np.full((rays // 64, 64, 1), reads)], axis=-1)
     points = starts.reshape(-1, 4).astype(np.float32).tolist()
@@ -55,7 +56,7 @@ def read_costs(repeats: int = 10) -> dict[str, float] | None:
             used = process_time()
             renderer._core.probe(["read_cost"], call, points, params, (0.0, 0.0, 0.0), 0.0)
             used = 1000 * (process_time() - used)
-            # What handing over the points takes is in the empty loop too.
+            # The upload of the points is part of the empty loop, too.
             seen.append(used if software else renderer.timings.get("probe"))
         return None if None in seen else min(seen[1:])
 
@@ -67,9 +68,9 @@ def read_costs(repeats: int = 10) -> dict[str, float] | None:
 
 
 def frame(scene: str, quality: str, size: Size, repeats: int) -> Row:
-    """One scene: its fastest frame, the bakes before it, and what it reads.
+    """Profile of one scene: its fastest frame, the bakes before it, and its texture reads.
 
-    The fastest, as the prices of reads are: what else runs on the machine disturbs it least.
+    The fastest frame is the one least disturbed by other load, as are the measured read costs.
     """
     camera, params = nubis.scenes[scene]
     renderer = nubis.Renderer(*size, quality=quality)
@@ -105,7 +106,7 @@ def frame(scene: str, quality: str, size: Size, repeats: int) -> Row:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Measure, print, write the results, and bring docs/speed.md up to date."""
+    """Measure, print and write the results, and update docs/speed.md."""
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks.profile",
         description="Where the time of a frame goes.",

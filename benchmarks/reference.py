@@ -1,4 +1,4 @@
-"""What the methods are compared with, kept in files because it is slow."""
+"""Reference pictures of the methods, cached in files."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Size = tuple[int, int]
 
 
 def reference_layers(scene: str, size: Size) -> Layers:
-    """The layers of a scene without any error that matters: rendered once, then read again."""
+    """Converged layers of a scene in `reference` quality, from the cache if possible."""
     renderer = _renderer(size)
     path = CACHE / f"{scene}-{size[0]}x{size[1]}-{_key(scene, renderer)}.npz"
     if path.exists():
@@ -36,12 +36,12 @@ def reference_layers(scene: str, size: Size) -> Layers:
 
 
 def about(size: Size) -> dict[str, object]:
-    """How the reference is computed, for the results."""
+    """Settings of the reference, for the header of the results."""
     return {"quality": _renderer(size).quality.to_dict()}
 
 
 def shader_hash() -> str:
-    """Of all shader files, by name and content, and of the constants that they share with Rust."""
+    """Hash of the names and contents of all shaders, and of the constants shared with Rust."""
     folder = Path(os.environ.get("NUBIS_SHADERS") or ROOT / "shaders" / "wgsl")
     digest = hashlib.sha256()
     for file in sorted(folder.rglob("*.wgsl")):

@@ -1,7 +1,7 @@
-"""How the time grows: the sweeps of vsu2022's tables 2 to 6 and of thesis2018's figures 39 and 41.
+"""Scaling of the render time: sweeps of vsu2022, tables 2 to 6, and thesis2018, figures 39 and 41.
 
-Published times come from other machines, so only shapes are compared: is it a line, and what is the
-time at the end of the sweep against that at its start?
+Published times come from other machines. Comparable are the linearity of a sweep and the ratio of
+the times at its end and its start.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from benchmarks.reference import Size
 
 @dataclass(frozen=True)
 class Sweep:
-    """A knob, its values, and the published milliseconds where there are any."""
+    """A setting, its values, and published milliseconds by value."""
 
     name: str
     title: str
@@ -32,7 +32,7 @@ class Sweep:
     published: dict[float, float] = field(default_factory=dict)
 
 
-# vsu2022 on an RTX 2060, milliseconds. Its light steps go to 250, where `Quality` ends at 128.
+# Milliseconds of vsu2022 on an RTX 2060. It has up to 250 light steps, `Quality` at most 128.
 SWEEPS = (
     Sweep(
         "table 3",
@@ -75,7 +75,7 @@ SWEEPS = (
     ),
 )
 
-# Table 6: view steps, coverage, light steps -> milliseconds.
+# vsu2022, table 6: (view steps, coverage, light steps) -> milliseconds.
 FACTORS = {
     (100, 0.3, 100): 0.5,
     (100, 0.3, 200): 0.7,
@@ -87,12 +87,12 @@ FACTORS = {
     (200, 0.8, 200): 2.8,
 }
 
-# Table 2: milliseconds of each bake. Our `noise="vsu2022"` makes the same textures.
+# vsu2022, table 2: milliseconds of each bake. `noise="vsu2022"` bakes the same textures.
 BAKES = {"weather": 3.0, "curl": 1.0, "shape": 8.0, "detail": 6.0}
 
 
 def measure(size: Size, repeats: int, quick: bool = False) -> Row:
-    """Run all sweeps; return what was measured and the fitted lines."""
+    """Measurements and linear fits of all sweeps."""
     sweeps = [replace(SWEEPS[0], values=(50, 100, 150))] if quick else SWEEPS
     factors = [] if quick else FACTORS
     bar = tqdm(total=sum(len(s.values) for s in sweeps) + len(factors), desc="shapes", disable=None)
@@ -106,7 +106,7 @@ def measure(size: Size, repeats: int, quick: bool = False) -> Row:
         return {
             "sweeps": [_sweep(sweep, run) for sweep in sweeps],
             "factors": [
-                # Half of the published light steps: `Quality` ends at 128.
+                # Half of the published light steps: `Quality` allows at most 128.
                 {"steps": n, "coverage": c, "light_steps": m // 2, "published_ms": ms}
                 | run(steps=n, coverage=c, light_steps=m // 2)
                 for (n, c, m), ms in (FACTORS.items() if factors else ())
@@ -117,7 +117,7 @@ def measure(size: Size, repeats: int, quick: bool = False) -> Row:
 
 
 def fit(x: Sequence[float], y: Sequence[float]) -> dict[str, float]:
-    """The line of least squares through points, and its coefficient of determination."""
+    """Linear least-squares fit of points, and its coefficient of determination."""
     slope, intercept = np.polyfit(x, y, 1)
     left = np.asarray(y) - (slope * np.asarray(x) + intercept)
     spread = np.sum((np.asarray(y) - np.mean(y)) ** 2)
@@ -129,9 +129,9 @@ def fit(x: Sequence[float], y: Sequence[float]) -> dict[str, float]:
 
 
 def in_step(samples: npt.NDArray[Any]) -> float:
-    """Evaluations a pixel if eight neighbours in a row all take as many as the one with the most.
+    """Mean evaluations per pixel if each of eight neighbours in a row costs as much as the maximum.
 
-    That is how lavapipe works with vectors of 256 bits, and GPUs do likewise with wider groups.
+    lavapipe executes eight invocations in lockstep (256-bit vectors); GPUs have wider groups.
     """
     edge = -samples.shape[1] % 8
     groups = np.pad(samples, ((0, 0), (0, edge))).reshape(len(samples), -1, 8)
@@ -150,7 +150,7 @@ def _render(
     **switches: Any,
 ) -> Row:
     quality = nubis.quality(base).replace(**switches)
-    if steps:  # toward the horizon; toward the zenith in the method's own proportion
+    if steps:  # toward the horizon; the ratio to those toward the zenith is kept
         zenith = round(steps * quality.steps_zenith / quality.steps_horizon)
         quality = quality.replace(steps_zenith=zenith, steps_horizon=steps)
     if light_steps:
@@ -166,7 +166,7 @@ def _render(
     return times | {
         "evaluations": float(samples.mean()),
         "evaluations_in_step": in_step(samples),
-        # What a cloudy pixel costs, how many there are, and how many rays ended early.
+        # Cost of a cloudy pixel; fractions of cloudy and of opaque pixels.
         "evaluations_cloudy": float(samples[cloudy].mean()) if cloudy.any() else 0.0,
         "cloudy": float(cloudy.mean()),
         "opaque": float(np.mean(layers["transmittance"] <= 0)),
@@ -190,7 +190,7 @@ def _sweep(sweep: Sweep, run: Callable[..., Row]) -> Row:
 
 
 def _bakes(repeats: int) -> Row:
-    """Milliseconds of each noise (where the adapter has timestamps) and of all by the clock."""
+    """GPU milliseconds of each noise bake (with timestamps), and wall-clock time of all."""
     renderer = nubis.Renderer(1, 1)
     params = nubis.Params().with_(**{"clouds.noise": "vsu2022", "light.model": "vsu2022"})
     clock, passes = [], []
@@ -200,7 +200,7 @@ def _bakes(repeats: int) -> Row:
         renderer.density([[0, 0, 0]], changed)
         clock.append(1000 * (perf_counter() - started))
         passes.append(renderer.timings)
-    # The first compiles.
+    # The first run compiles.
     names = [name for name in passes[-1] if name in (*BAKES, "downsample")]
     return {
         "clock_ms": float(np.median(clock[1:])),
@@ -211,7 +211,7 @@ def _bakes(repeats: int) -> Row:
 
 
 def _switches(size: Size, repeats: int) -> list[Row]:
-    """Figure 39: what each of the thesis' optimisations saves. A and C cannot be switched off."""
+    """thesis2018, figure 39: savings by optimisations. A and C cannot be switched off."""
     off = {"min_transmittance": 0.0, "big_step": 1}
     steps = {
         "A, C: light and detail only in cloud": off,

@@ -1,7 +1,7 @@
-"""How much faster than the published methods, what a scene's content costs, and how the time grows.
+"""Speed-up over the published methods, cost of scene content, scaling with pixels, animation.
 
-Every still is made by a renderer of its own: sky, weather and light are baked within the time; only
-noise and pipelines are there before, as in every process but the first.
+Every still is timed on a new renderer: the time includes bakes of sky, weather and light, but not
+of noise and pipelines, which are cached on disk by the first process.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ Row = dict[str, Any]
 RESULTS = Path(__file__).parent / "results"
 
 PUBLISHED = "nubis2015", "thesis2018", "vsu2022"
-#: What stands against them: the fastest that errs no more than they do.
+#: Own qualities: the fastest of at most the same error is compared with a published one.
 OURS = {
     "preview, coarser": nubis.quality("preview").replace(light_steps=6, light_share=0.3),
     "preview": nubis.quality("preview"),
@@ -52,25 +52,25 @@ OURS = {
         steps_zenith=168, steps_horizon=400, big_step=4, contrast=0.0
     ),
 }
-#: Those of them that users call by name.
+#: Own qualities with a public name.
 NAMED = "preview", "draft", "balanced"
-#: What all are compared with: at this size `reference` would take hours. It errs by 1 % itself, in
-#: `storm` by 7 %, in `sunset` by 28 % (docs/accuracy.md).
+#: Reference of all errors, because `reference` would take hours at this size. Its own error is 1 %,
+#: in `storm` 7 %, in `sunset` 28 % (docs/accuracy.md).
 TRUTH = nubis.quality("high")
-#: The three views of the best open web renderer on the same driver, and their like here.
+#: Scenes that match the three views of the best open web renderer on the same driver.
 ANCHORS = "fair_weather", "sunset", "above"
-#: What is measured of `high`, too, which takes half a minute a picture.
+#: Cases that are also measured in `high`, at half a minute per picture.
 AIMED = "clear sky", "night", "a tenth"
-#: In what an animation is made at 1920x1080, and in the views of the anchors: the coarsest first.
+#: Qualities of animations at 1920x1080 and of the anchor scenes, from coarse to fine.
 FLOWN = "preview", "draft", "balanced", "high"
 ANCHORED = "preview", "draft"
-FRAMES = 26  # of an animation; the first is a still, the second compiles
+FRAMES = 26  # per animation; the first is a still, the second compiles
 
 
 def still(
     size: Size, quality: nubis.Quality, camera: nubis.Camera, params: nubis.Params, repeats: int
 ) -> Row:
-    """The time of a still, everything but noise and pipelines cold."""
+    """Time of a still with cold caches, except noise and pipelines."""
     nubis.Renderer(*size, quality=quality).render(camera, params)
     wall, processor = [], []
     for _ in range(repeats):
@@ -86,7 +86,7 @@ def still(
 
 
 def presets(size: Size, repeats: int) -> list[Row]:
-    """Time and error of the published methods and of ours, for every scene."""
+    """Times and errors of the published and the own methods, for every scene."""
     methods = {name: nubis.quality(name) for name in PUBLISHED} | OURS
     rows = []
     for scene in tqdm(measure.marched(), unit="scene", disable=None):
@@ -101,9 +101,9 @@ def presets(size: Size, repeats: int) -> list[Row]:
 
 
 def ratios(rows: list[Row]) -> list[Row]:
-    """How much faster than each published method the fastest of ours is that errs no more.
+    """Speed-up of the fastest own method of at most the same error over each published method.
 
-    Of all of ours, and of those that have a name alone.
+    The speed-up is computed for all of `OURS`, and for `NAMED` alone.
     """
     found = []
     for theirs in (row for row in rows if row["method"] in PUBLISHED):
@@ -119,7 +119,7 @@ def ratios(rows: list[Row]) -> list[Row]:
 
 
 def _fastest(rows: list[Row], theirs: Row, methods: Sequence[str]) -> Row | None:
-    """The fastest of `methods` that errs no more than `theirs` in its scene."""
+    """The fastest of `methods` whose error in the scene of `theirs` is at most that of `theirs`."""
     as_good = [
         row
         for row in rows
@@ -131,7 +131,7 @@ def _fastest(rows: list[Row], theirs: Row, methods: Sequence[str]) -> Row | None
 
 
 def _truth(scene: str, size: Size) -> Layers:
-    """As `reference.reference_layers`, at a size that it would take hours for."""
+    """Layers of the reference `TRUTH`, cached as in `reference.reference_layers`."""
     key = f"{scene}-truth-{size[0]}x{size[1]}-{reference.shader_hash()}.npz"
     path = reference.CACHE / key
     if not path.exists():
@@ -145,7 +145,7 @@ def _truth(scene: str, size: Size) -> Layers:
 
 
 def content(size: Size, repeats: int) -> list[Row]:
-    """What a scene costs by what is in it, as a share of the same with more."""
+    """Cost of scene content: time without a feature, relative to the time with it."""
     rows = []
     for quality in "draft", "balanced", "high":
         for name, scene, less, more in _pairs():
@@ -177,7 +177,7 @@ def _pairs() -> Iterator[tuple[str, str, Row, Row]]:
         bare | {"clouds.coverage": 0.325},
         bare | {"clouds.coverage": 0.9},
     )
-    # What a picture has, and what it costs when it is switched off.
+    # Features that are switched off one at a time.
     yield "without air", "fair_weather", {"atmosphere.enabled": False}, {}
     yield "without shadows on the ground", "fair_weather", {"atmosphere.ground_shadows": False}, {}
     yield "without beams", "fair_weather", {"atmosphere.beams": False}, {}
@@ -188,7 +188,7 @@ def _pairs() -> Iterator[tuple[str, str, Row, Row]]:
 
 
 def growth(repeats: int) -> list[Row]:
-    """Time by pixels, of `fair_weather`; by steps it is in the part `shapes`."""
+    """Time of `fair_weather` by number of pixels (benchmarks/shapes.py: by number of steps)."""
     rows = []
     for size in (480, 270), (960, 540), (1920, 1080):
         for quality in "draft", "balanced":
@@ -200,10 +200,10 @@ def growth(repeats: int) -> list[Row]:
 def animation(
     scene: str, size: Size, quality: str, *, errors: bool = True, plots: Path | None = None
 ) -> Row:
-    """A flight at 60 m/s: the time of a frame, and how far frames and stills are from each other.
+    """Frame times of a flight at 60 m/s, and differences between frames and stills.
 
-    And how far the last of both is from `high`, whose stills have hardly any noise. That frame of
-    the flight is saved among the `plots`.
+    The last frame and its still are also compared with a still in `high`, which has little noise.
+    With `plots`, the last frame is saved.
     """
     method = nubis.quality(quality)
     shots = list(_flight(scene))
@@ -238,7 +238,7 @@ def animation(
 
 def _flight(scene: str) -> Iterator[tuple[nubis.Camera, nubis.Params, float]]:
     camera, params = nubis.scenes[scene]
-    # The disc is so bright that a twentieth of a pixel would be all the error.
+    # The sun's disc is so bright that a shift by a twentieth of a pixel would dominate the error.
     params = params.with_(**{"sun.visible": False})
     eye, forward = np.array(camera.eye), np.array(camera.forward)
     for i in range(FRAMES):
@@ -251,7 +251,7 @@ def _difference(frame: npt.NDArray[Any], still: npt.NDArray[Any]) -> float:
     return float(np.sqrt(np.mean(error**2)) / still[..., :3].mean())
 
 
-#: What is measured, each with tables of its own in docs/speed.md.
+#: Parts of the measurement, with a table each in docs/speed.md.
 PARTS = "published", "content", "growth", "animation"
 
 
@@ -263,7 +263,7 @@ def run(
     plots: Path | None = None,
     quick: bool = False,
 ) -> Row:
-    """All of it, or some parts."""
+    """Results of the given parts."""
     found: Row = {}
     if "published" in parts:
         found["presets"] = presets(size, repeats)
@@ -289,7 +289,7 @@ def run(
 
 
 def main() -> None:
-    """Measure, and write benchmarks/results/speed.json: what is new in place of what was."""
+    """Measure, and update the measured parts of benchmarks/results/speed.json."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.speed", description=__doc__)
     parser.add_argument("--size", default="1280x720", metavar="WxH")
     parser.add_argument("--repeats", type=int, default=3)

@@ -1,7 +1,7 @@
 """An animation.
 
-A time-lapse of 16 frames, a second apart; each takes over most of its pixels from the one
-before. `ffmpeg -i out/animate_%02d.png clouds.mp4` makes a film of them.
+A time-lapse of 16 frames, one second apart, with temporal reprojection between frames.
+`ffmpeg -i out/animate_%02d.png clouds.mp4` encodes a video.
 """
 
 from pathlib import Path

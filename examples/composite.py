@@ -1,8 +1,8 @@
 """A mountain in the clouds.
 
-A heightfield is traced with NumPy, as any renderer of yours might do it, and put among the clouds:
-metres along each ray, linear radiance, and how much of each pixel it covers. Clouds cast their
-shadows on it through `sun_transmittance`.
+A heightfield is ray traced with NumPy, in place of an external renderer, and composited with the
+clouds by its distance along each ray, its linear radiance, and its coverage of each pixel. Shadows
+of the clouds on it come from `sun_transmittance`.
 """
 
 from pathlib import Path
@@ -14,7 +14,7 @@ import nubis
 
 Array = npt.NDArray[np.float64]
 
-WIDTH, HEIGHT, FINER = 240, 135, 2  # rays for a pixel, in both directions
+WIDTH, HEIGHT, FINER = 240, 135, 2  # rays per pixel, in both directions
 EYE = np.array([0.0, -13_000.0, 1300.0])
 
 camera = nubis.Camera.look_at(eye=EYE, target=(0, 0, 1700), fov_y=32.0)
@@ -31,7 +31,7 @@ params = nubis.Params().with_(
 
 
 def heights(side: int = 512, extent: float = 16_000.0) -> tuple[Array, float]:
-    """Ridges of random waves that rise to a summit in the middle."""
+    """Heightfield in metres: ridged noise with a summit in the centre; and its extent in metres."""
     rng = np.random.default_rng(4)
     y, x = np.mgrid[:side, :side] / side - 0.5
     relief = np.zeros((side, side))
@@ -47,7 +47,7 @@ def heights(side: int = 512, extent: float = 16_000.0) -> tuple[Array, float]:
 
 
 def looked_up(table: Array, extent: float, x: Array, y: Array) -> Array:
-    """Values of a table over a square about the origin, linear between its points."""
+    """Bilinear interpolation of a table over a square that is centred on the origin."""
     last = len(table) - 1
     column = ((x / extent + 0.5) * last).clip(0, last - 1e-6)
     row = ((y / extent + 0.5) * last).clip(0, last - 1e-6)
@@ -59,7 +59,7 @@ def looked_up(table: Array, extent: float, x: Array, y: Array) -> Array:
 
 
 def traced(directions: Array, table: Array, extent: float) -> Array:
-    """Metres to the heightfield, inf where a ray misses it."""
+    """Distance in metres to the heightfield along rays, inf for a miss."""
     distance = np.full(len(directions), np.inf)
     left = np.arange(len(directions))
     for t in np.geomspace(5000, 22_000, 150):
@@ -71,7 +71,7 @@ def traced(directions: Array, table: Array, extent: float) -> Array:
 
 
 def rays(finer: int) -> Array:
-    """Directions of the camera, so many for a pixel in both directions."""
+    """Unit ray directions of the camera, `finer` per pixel in both directions."""
     tan = np.tan(np.radians(camera.fov / 2))
     x = (2 * (np.arange(WIDTH * finer) + 0.5) / (WIDTH * finer) - 1) * tan * WIDTH / HEIGHT
     y = (1 - 2 * (np.arange(HEIGHT * finer) + 0.5) / (HEIGHT * finer)) * tan
@@ -82,13 +82,13 @@ def rays(finer: int) -> Array:
     return unit
 
 
-# Of the finer rays in a pixel some meet the mountain: that is its cover, the nearest its depth.
+# Coverage is the fraction of the rays of a pixel that hit; depth is that of the nearest hit.
 table, extent = heights()
 distance = traced(rays(FINER), table, extent).reshape(HEIGHT, FINER, WIDTH, FINER)
 cover = np.isfinite(distance).mean(axis=(1, 3))
 scene_depth = distance.min(axis=(1, 3))
 
-# Lambert's law under the sun, which clouds shadow, and a blue sky; snow where it is high and level.
+# Lambertian shading by shadowed sunlight and a blue sky; snow on high and gentle slopes.
 renderer = nubis.Renderer(WIDTH, HEIGHT, quality="draft")
 there = cover > 0
 points = EYE + scene_depth[there][:, None] * rays(1)[there.ravel()]
@@ -105,7 +105,7 @@ irradiance = 8 * (shadow * (normal @ sun).clip(0))[:, None] + np.array([0.7, 0.9
 snow = ((points[:, 2] - 1500) / 600).clip(0, 1) * ((normal[:, 2] - 0.45) * 4).clip(0, 1)
 albedo = np.array([0.13, 0.12, 0.09]) + snow[:, None] * np.array([0.6, 0.62, 0.66])
 
-# Premultiplied by the cover.
+# Premultiplied by coverage.
 scene_color = np.zeros((HEIGHT, WIDTH, 4))
 scene_color[there, :3] = albedo / np.pi * irradiance
 scene_color[there, 3] = 1.0

@@ -1,8 +1,8 @@
 """A day.
 
-A time-lapse from dawn to dusk between a few skies: clouds grow until the afternoon, then it clears
-up. `python examples/day.py --frames 480 --size 960x540` takes a while, and
-`ffmpeg -i out/day_%03d.png day.mp4` makes a film of it.
+A time-lapse from dawn to dusk, interpolated between five skies: clouds grow until the afternoon and
+dissipate in the evening. `python examples/day.py --frames 480 --size 960x540` renders all frames,
+and `ffmpeg -i out/day_%03d.png day.mp4` encodes a video.
 """
 
 import argparse
@@ -23,7 +23,7 @@ parser.add_argument("--frames", type=int, default=8)
 parser.add_argument("--size", type=size, default=(320, 180), metavar="WxH")
 args = parser.parse_args()
 
-# Hour of the day, and what its sky is like. The wind stays: `nubis.lerp` says why.
+# Hour of the day, and the changes of its sky. Winds are constant, as `nubis.lerp` requires.
 base = nubis.Params()
 keys: list[tuple[float, dict[str, Any]]] = [
     (6.0, {"sun.elevation": 1.0, "sun.azimuth": 80.0, "clouds.coverage": 0.33}),
@@ -77,6 +77,6 @@ renderer = nubis.Renderer(*args.size, quality="draft")
 first, last = skies[0][0], skies[-1][0]
 for i in range(args.frames):
     hour = first + (last - first) * i / max(args.frames - 1, 1)
-    # Wind blows for an eighth of the time, so that a time-lapse of few frames does not flicker.
+    # The time of the wind is scaled by an eighth, against flicker in a time-lapse of few frames.
     frame = renderer.render(camera, sky_at(hour), time=3600 * hour / 8)
     nubis.save(f"out/day_{i:03}.png", frame)

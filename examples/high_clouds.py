@@ -1,7 +1,7 @@
 """High clouds alone.
 
-A sky without any volume to march: cirrus, a mackerel sky, and between them what has something of
-both. The last is embossed toward the sun.
+Skies without volumetric clouds: cirrus, a mixture of cirrus and altocumulus, altocumulus (a
+mackerel sky), and altocumulus with full emboss toward the sun.
 """
 
 from pathlib import Path

@@ -1,6 +1,6 @@
 """Layers.
 
-Puts the clouds before a background of your own, and saves how far away they are.
+Composites the clouds over a custom background, and saves their depth.
 """
 
 from pathlib import Path
@@ -14,12 +14,12 @@ Path("out").mkdir(exist_ok=True)
 camera, params = nubis.scenes["fair_weather"]
 layers = nubis.Renderer(320, 180, quality="draft").render_layers(camera, params)
 
-# `layers["sky"]` would give what `render` returns. This one is violet above and orange below.
+# With `layers["sky"]` the composite equals `render`. This background goes from violet to orange.
 down = np.linspace(0, 1, 180)[:, None, None]
 background = (1 - down) * [0.2, 0.1, 0.5] + down * [1.0, 0.5, 0.2]
 picture = layers["radiance"] + layers["transmittance"][..., None] * background
 nubis.save("out/layers.png", picture)
 
-# White is 2 km away or less, black is no cloud: there the depth is infinite.
+# White: depth of 2 km or less. Black: infinite depth, no clouds.
 nearness = 2000 / layers["depth"]
 nubis.save("out/layers_depth.png", np.stack([nearness] * 3, axis=-1), tonemap="none")

@@ -1,6 +1,7 @@
-"""Weather of your own.
+"""A user-supplied weather map.
 
-An array says where the clouds are: here a spiral 40 km wide, seen from 25 km up.
+An array sets coverage, type and precipitation by place: a spiral of 40 km in diameter, seen from an
+altitude of 25 km.
 """
 
 from pathlib import Path
@@ -11,7 +12,7 @@ import nubis
 
 Path("out").mkdir(exist_ok=True)
 
-# East and north of the middle of the map, which is the origin of the world; row 0 is the north.
+# East and north of the centre of the map, the origin of the world; row 0 is in the north.
 x, y = np.meshgrid(np.linspace(-1, 1, 256), np.linspace(1, -1, 256))
 radius, angle = np.hypot(x, y), np.arctan2(y, x)
 coverage = (0.5 + 0.5 * np.cos(2 * angle - 14 * radius)) * np.clip(4 * (0.8 - radius), 0, 1)
@@ -22,7 +23,7 @@ params = nubis.Params().with_(
     **{
         "weather.map": np.stack([coverage, kind, rain], axis=-1),
         "weather.extent": 50_000.0,
-        # One half takes the map as it is.
+        # 0.5 leaves the map unchanged.
         "clouds.coverage": 0.5,
         "clouds.type": 0.5,
         "high_clouds.coverage": 0.0,

@@ -1,7 +1,7 @@
 """Painted weather.
 
-A ring of clouds by strokes of a brush, with a clear lane through it, on the map of the default
-weather thinned out; seen from 20 km up.
+Brush strokes on the default weather map at reduced coverage: a ring of clouds with a clear lane
+through it, seen from an altitude of 20 km.
 """
 
 from pathlib import Path
@@ -14,7 +14,7 @@ Path("out").mkdir(exist_ok=True)
 
 extent = 50_000.0
 renderer = nubis.Renderer(320, 180, quality="draft")
-# What the noise would make, as an array to paint on: six tenths of its coverage are left.
+# The baked weather map as an array, with its coverage scaled by 0.6.
 map = renderer.weather_map(nubis.Params(weather=nubis.Weather(extent=extent)))
 map = nubis.paint_mask(map, np.ones(map.shape[:2]), mode="multiply", amount=0.6)
 
@@ -24,13 +24,13 @@ ring = 9000 * np.column_stack([np.cos(angle), np.sin(angle)])
 map = nubis.paint(map, ring, 4000.0, extent=extent, amount=0.6, hardness=0.1)
 lane = [(-3000, -14_000), (3000, 14_000)]
 map = nubis.paint(map, lane, 2000.0, extent=extent, mode="set", amount=0.0, hardness=0.8)
-nubis.save("out/paint_weather_map.exr", map)  # `nubis.load_map` reads it again
+nubis.save("out/paint_weather_map.exr", map)  # `nubis.load_map` reads it
 
 params = nubis.Params().with_(
     **{
         "weather.map": map,
         "weather.extent": extent,
-        "clouds.coverage": 0.5,  # takes the map as it is
+        "clouds.coverage": 0.5,  # leaves the map unchanged
         "high_clouds.coverage": 0.0,
     }
 )

@@ -1,7 +1,7 @@
 """A panorama.
 
-The whole sphere in linear light, to illuminate scenes in other programs: Blender, Unreal and most
-others read either file.
+An equirectangular environment map in linear light, for image-based lighting. Blender, Unreal and
+most other programs read both files.
 """
 
 from pathlib import Path
@@ -11,7 +11,7 @@ import nubis
 Path("out").mkdir(exist_ok=True)
 
 camera = nubis.Camera.equirect(eye=(0, 0, 2))
-# A few pixels as bright as the sun's disc make noise; a lamp in the other program replaces it.
+# The disc of the sun covers few pixels and causes noise: use a directional light for it.
 params = nubis.Params(sun=nubis.Sun(elevation=30, azimuth=140, visible=False))
 frame = nubis.Renderer(400, 200, quality="draft").render(camera, params)
 nubis.save("out/panorama.exr", frame)

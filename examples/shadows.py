@@ -1,7 +1,7 @@
 """Shadows of clouds.
 
-A map of how much direct sun reaches the ground, how much of the sun a camera sees as the clouds
-drift by, and the ground from above.
+A shadow map of the ground, the visibility of the sun from a camera while clouds drift by, and the
+shadowed ground from above.
 """
 
 from pathlib import Path
@@ -19,7 +19,7 @@ light = shadow.transmittance
 nubis.save("out/shadow_map.png", np.repeat(light[..., None], 3, axis=2), tonemap="none")
 print(f"{light.mean():.0%} of the sun reaches the ground")
 
-# Which texel has the shadow of a point of a cloud?
+# The texel of the shadow of a point in a cloud.
 column, row, height, _ = np.linalg.inv(shadow.world_from_map) @ (1000, 2000, 1500, 1)
 print(f"a point {height:.0f} m up has its shadow at row {row:.0f}, column {column:.0f}")
 

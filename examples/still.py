@@ -1,6 +1,6 @@
 """A still.
 
-The shortest program: where the camera is, what the sky is like, and a file.
+The shortest program: a camera, the parameters of a sky, and an image file.
 """
 
 from pathlib import Path

@@ -1,9 +1,10 @@
-"""Twenty-four hours of a place.
+"""Twenty-four hours at one place.
 
-The sun stands where it does over Munich at the summer solstice; the weather goes from fair to a
-storm and back. `python examples/time_lapse.py --frames 288 --size 960x540` takes a while, and
-`ffmpeg -i out/time_lapse_%03d.png time_lapse.mp4` makes a film of it. The exposure follows the
-light as an eye does: a part of the way. Needs `pip install "nubis[sun]"`.
+The position of the sun is that over Munich at the summer solstice; the weather changes from fair to
+stormy and back. Exposure adapts partly to the luminance, as the eye does.
+`python examples/time_lapse.py --frames 288 --size 960x540` renders all frames, and
+`ffmpeg -i out/time_lapse_%03d.png time_lapse.mp4` encodes a video. Requires
+`pip install "nubis[sun]"`.
 """
 
 import argparse
@@ -28,8 +29,8 @@ args = parser.parse_args()
 fair = nubis.Params()
 storm = {"clouds.coverage": 0.6, "clouds.precipitation": 0.7, "clouds.top": 5000.0}
 gale = {"wind.speed": 16.0, "wind.weather_speed": 16.0, "wind.detail_speed": 21.0}
-# Hours since midnight, and how many seconds the wind blows in each: for an eighth of the time, so
-# that a time-lapse of few frames does not flicker.
+# Seconds of wind per hour of the day. The time of the wind is scaled by an eighth, against flicker
+# in a time-lapse of few frames. Key times are hours since midnight.
 WIND = 3600 / 8
 weather = nubis.Keyframes(
     [

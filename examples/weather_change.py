@@ -1,7 +1,8 @@
-"""A change of weather.
+"""Transitions of the weather.
 
-A fair sky clouds over within half a minute, as a map of one texel says, and before it has, other
-fair weather comes. With two frames a second or more `renderer.animate` makes a film of it.
+A fair sky becomes overcast (a uniform map of one texel) within 30 s; before the end of that
+transition, another one to fair weather of another map begins. `renderer.animate` reprojects frames
+of these transitions at three frames per second or more; at fewer, each frame is a still.
 """
 
 from pathlib import Path

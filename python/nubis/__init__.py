@@ -6,8 +6,9 @@
     frame = nubis.Renderer(960, 540).render(camera, nubis.Params())
     nubis.save("sky.png", frame)
 
-World: right-handed metres, x east, y north, z up, z = 0 at sea level under the origin. Angles are
-degrees, time is seconds. Frames are float32, scene-linear, with Rec. 709 primaries.
+World coordinates are right-handed and in metres: x east, y north, z up, z = 0 at sea level at the
+origin. Angles are in degrees, time is in seconds. Frames are float32, scene-linear, with Rec. 709
+primaries and premultiplied alpha.
 """
 
 import atexit as _atexit
@@ -56,9 +57,9 @@ from nubis.params import (
     Wind,
 )
 
-# Here, where a program is about to start threads and has loaded no driver.
+# At import: settings of the driver must precede its loading and the start of threads.
 _os.environ.update(_nubis.driver_settings())
-# Daemon threads that render meet the end of the interpreter: crates/clouds_py/src/exit.rs.
+# Stops renders in daemon threads at interpreter exit (crates/clouds_py/src/exit.rs).
 _atexit.register(_nubis.close)
 if hasattr(_os, "register_at_fork"):
     _os.register_at_fork(after_in_child=_nubis.forked)

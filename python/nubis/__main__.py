@@ -176,7 +176,7 @@ def _render(args: argparse.Namespace) -> None:
 
 
 def _sky(args: argparse.Namespace, params: nubis.Params) -> nubis.Params:
-    """The sky of a scene, or what is asked for in its place."""
+    """The sky of a scene, or the one that the arguments select instead."""
     if args.params:
         params = nubis.Params.load(args.params)
     elif args.preset is not None:
@@ -185,13 +185,13 @@ def _sky(args: argparse.Namespace, params: nubis.Params) -> nubis.Params:
 
 
 def _targets(args: argparse.Namespace) -> list[tuple[str, Path]]:
-    """Which scenes go into which files."""
+    """Scene names and output files of the arguments."""
     names: list[str] = list(nubis.scenes) if args.all else args.scenes
     if not names:
         known = ", ".join(nubis.scenes)
         raise nubis.ParameterError(f"no scene is given: name some of {known}, or use --all")
     for name in names:
-        nubis.scenes[name]  # raises for one that is not there
+        nubis.scenes[name]  # raises for an unknown name
     out = Path(args.out)
     kind = out.suffix.lower()
     if args.out.endswith(("/", os.sep)) or out.is_dir() or not kind:
@@ -220,7 +220,7 @@ def _heat_path(path: Path) -> Path:
 def _progress(
     targets: list[tuple[str, Path]],
 ) -> AbstractContextManager[Iterable[tuple[str, Path]]]:
-    """The targets, behind a progress bar where there are tqdm and a terminal."""
+    """The targets, wrapped in a progress bar if tqdm and a terminal are available."""
     try:
         from tqdm import tqdm
     except ImportError:
@@ -243,7 +243,7 @@ def _presets(_: argparse.Namespace) -> None:
 def _adapters(_: argparse.Namespace) -> None:
     found = nubis.adapters()
     if not found:
-        nubis.Renderer(1, 1)  # Raises the error that says what would help.
+        nubis.Renderer(1, 1)  # raises the error that names a package that helps
     for index, adapter in enumerate(found):
         print(f"{index}: {_line(adapter)}")
 
@@ -268,11 +268,11 @@ def _info(args: argparse.Namespace) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command; return 0, 2 after a mistake, 1 after a surprise, 130 after Ctrl-C."""
+    """Run a command. Exit status: 0, 1 internal error, 2 user or file error, 130 Ctrl-C."""
     args = _parser().parse_args(arguments)
     try:
         with warnings.catch_warnings():
-            # The line with the adapter says so too.
+            # Redundant: the adapter is printed.
             warnings.filterwarnings("ignore", "no hardware Vulkan adapter")
             args.run(args)
     except KeyboardInterrupt:

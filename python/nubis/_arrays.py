@@ -1,7 +1,7 @@
-"""The gate for arrays: what comes in as an array keeps its meaning, or is refused.
+"""Validation of array arguments: an array that would lose meaning in the conversion is refused.
 
-`numpy.asarray` drops masks, axis names, units and imaginary parts without a word. The binding
-(crates/clouds_py/src/convert.rs) asks here too.
+`numpy.asarray` silently drops masks, axis names, units and imaginary parts. The binding
+(crates/clouds_py/src/convert.rs) converts arrays by this module too.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ import numpy.typing as npt
 
 from nubis._errors import ParameterError
 
-#: One entry an axis: its length, or None for any.
+#: Length of each axis; None allows any length.
 Shape = tuple[int | None, ...]
 
 
 class UnfitError(ValueError):
-    """A value that is no array of numbers. The message is the value in the words of an error."""
+    """A value that is no array of numbers. The message describes the value, for an error text."""
 
 
 def opened(value: Any, dims: Sequence[str] = (), kinds: str = "fiu") -> npt.NDArray[Any]:
@@ -29,16 +29,21 @@ def opened(value: Any, dims: Sequence[str] = (), kinds: str = "fiu") -> npt.NDAr
     Parameters
     ----------
     value : array-like
-        NumPy arrays, nested sequences, and what has ``__array__``.
+        NumPy array, nested sequence, or object with ``__array__``.
     dims : sequence of str
-        Names of the first axes. A DataArray is transposed to them, its other axes last.
+        Names of the leading axes. A DataArray is transposed to this order, other axes last.
     kinds : str
-        The kinds of dtype (`numpy.dtype.kind`) that are allowed.
+        Allowed kinds of dtype (`numpy.dtype.kind`).
+
+    Returns
+    -------
+    array
+        A view of `value` where NumPy makes one.
 
     Raises
     ------
     UnfitError
-        For masked values, axes without a known name, sparse and ragged arrays, numbers with a unit,
+        For masked values, unexpected axis names, sparse and ragged arrays, quantities with a unit,
         and other dtypes.
     """
     hidden = sum(_masked(value))
@@ -54,7 +59,7 @@ def opened(value: Any, dims: Sequence[str] = (), kinds: str = "fiu") -> npt.NDAr
         value = _by_dims(value, tuple(dims))
     try:
         array = np.asarray(value)
-    except Exception as error:  # whatever a class of its own raises
+    except Exception as error:  # a foreign class may raise anything
         raise UnfitError(f"{type(value).__name__} that is no array ({error})") from None
     if array.dtype.kind not in kinds:
         raise UnfitError(f"array of shape {array.shape} and dtype {array.dtype}")
@@ -71,24 +76,25 @@ def numbers(
     dtype: npt.DTypeLike = np.float64,
     nonfinite: str = "",
 ) -> npt.NDArray[Any]:
-    """Return the array argument `name` in C order, not copied where it is so already.
+    """Return the array argument `name` in C order, without a copy where possible.
 
     Parameters
     ----------
     name, allowed : str
-        For the error: ``<name> = <what was given> is not allowed: it must be <allowed>``.
+        Parts of the error message: ``<name> = <value> is not allowed: it must be <allowed>``.
     shapes : sequence of shapes
-        Those allowed, None for any length from 1 on.
+        Allowed shapes; None allows any length from 1.
     dims : sequence of str
         As for `opened`.
     dtype : dtype
-        Of the result.
+        Dtype of the result.
     nonfinite : {"", "inf", "nan"}
-        None, infinities, or NaN too.
+        Allowed non-finite values: none, infinities, or infinities and NaN.
 
     Raises
     ------
     ParameterError
+        For a value that is no array of numbers, another shape, or non-finite values.
     """
     try:
         array = opened(value, dims)
@@ -108,7 +114,7 @@ def numbers(
 def first_bad(
     name: str, array: npt.NDArray[Any], bad: npt.NDArray[np.bool_], allowed: str
 ) -> ParameterError:
-    """The error for values that are not allowed: the first, where it is, and how many there are."""
+    """The error for values that are not allowed: the first one, its index, and their number."""
     at = tuple(int(i) for i in np.argwhere(bad)[0])
     place = f"[{', '.join(map(str, at))}]" if at else ""
     count = int(bad.sum())
@@ -127,7 +133,7 @@ def _fits(shape: tuple[int, ...], wanted: Shape) -> bool:
 
 
 def _masked(value: Any) -> Iterator[int]:
-    """How many values are masked, in an array or in those of a nested list."""
+    """Numbers of masked values, of an array or of the arrays in a nested list."""
     if isinstance(value, np.ma.MaskedArray):
         yield int(np.count_nonzero(np.ma.getmaskarray(value)))
     elif isinstance(value, list | tuple):
@@ -137,7 +143,7 @@ def _masked(value: Any) -> Iterator[int]:
 
 
 def _by_dims(value: Any, dims: tuple[str, ...]) -> Any:
-    """The values of a DataArray with the axes `dims` first."""
+    """Values of a DataArray, transposed to the axes `dims`, other axes last."""
     given = value.dims
     if len(given) < 2:
         return value.values
@@ -155,7 +161,7 @@ def _by_dims(value: Any, dims: tuple[str, ...]) -> Any:
 
 
 def _check_ascending(name: str, value: Any, *, upward: bool) -> None:
-    """Refuses an axis that runs the other way: x to the west, or of a grid any toward less."""
+    """Refuse a descending axis: x, or any axis of a grid (`upward`)."""
     coords = getattr(value, "coords", {})
     if name not in coords or not (upward or name == "x"):
         return

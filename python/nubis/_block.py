@@ -1,4 +1,4 @@
-"""What all parameter classes share: checking, comparing, replacing, and files."""
+"""Base classes of all parameter classes: validation, comparison, replacement, files."""
 
 from __future__ import annotations
 
@@ -20,17 +20,27 @@ from nubis._nubis import DensityGrid
 
 
 class Base:
-    """A frozen dataclass that compares by value, arrays included."""
+    """A frozen dataclass with comparison and hash by value, arrays included."""
 
     __dataclass_fields__: ClassVar[dict[str, dataclasses.Field[Any]]]
 
     def __new__(cls, *_: Any, **given: Any) -> Self:
-        # Before the `__init__` of the dataclass, whose error does not say what there is.
+        # Before the `__init__` of the dataclass, whose error does not list the fields.
         refuse_arguments(cls.__name__, given, cls.__dataclass_fields__)
         return super().__new__(cls)
 
     def replace(self, **changes: Any) -> Self:
-        """Return a copy with some fields changed."""
+        """Return a copy with some fields changed.
+
+        Raises
+        ------
+        ParameterError
+            For an unknown field, or a value that is not allowed.
+
+        Examples
+        --------
+        >>> sun = nubis.Sun().replace(elevation=5.0)
+        """
         names = [f.name for f in dataclasses.fields(self)]
         for name, value in changes.items():
             if name not in names:
@@ -42,12 +52,12 @@ class Base:
         return tuple((v.shape, v.tobytes()) if isinstance(v, np.ndarray) else v for v in values)
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        # Of another version there may be more.
+        # A pickle of another version may have further fields.
         names = [f.name for f in dataclasses.fields(self)]
         for name, value in state.items():
             if name not in names:
                 raise _unknown(f"{type(self).__name__}.{name}", value, names)
-        # Copies and pickles of arrays come writeable.
+        # Copied and unpickled arrays are writeable.
         for value in state.values():
             if isinstance(value, np.ndarray):
                 value.flags.writeable = False
@@ -63,7 +73,7 @@ class Base:
 
 
 class Block(Base):
-    """A group of parameters. Every value is checked when it is made."""
+    """A group of parameters. Every value is validated on construction."""
 
     def __post_init__(self) -> None:
         name = type(self).__name__
@@ -73,7 +83,7 @@ class Block(Base):
             object.__setattr__(self, field.name, value)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain values by field name; arrays as nested lists."""
+        """Return built-in Python values by field name; arrays become nested lists."""
         values = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
         return {
             k: v.tolist() if isinstance(v, np.ndarray) else list(v) if isinstance(v, tuple) else v
@@ -82,7 +92,7 @@ class Block(Base):
 
 
 class Root(Base):
-    """All groups of parameters together."""
+    """Base class of `Params`: all groups of parameters."""
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
@@ -91,7 +101,7 @@ class Root(Base):
             if field.name == "weather_mix":
                 object.__setattr__(self, field.name, _mixture(value))
                 continue
-            if field.default is None:  # A group that may be missing: the volume.
+            if field.default is None:  # the optional group: the volume
                 fits = value is None or isinstance(value, DensityGrid)
                 allowed = "DensityGrid or None"
             else:
@@ -104,7 +114,17 @@ class Root(Base):
         _nubis.check_params(self)
 
     def with_(self, **changes: Any) -> Self:
-        """Return a copy with deep fields changed: ``with_(**{"clouds.coverage": 0.7})``."""
+        """Return a copy with fields of groups changed, by dotted names.
+
+        Raises
+        ------
+        ParameterError
+            For an unknown field, or a value that is not allowed.
+
+        Examples
+        --------
+        >>> params = nubis.Params().with_(**{"clouds.coverage": 0.7, "sun.elevation": 20.0})
+        """
         blocks: dict[str, dict[str, Any]] = {}
         groups = [f.name for f in dataclasses.fields(self)]
         for path, value in changes.items():
@@ -128,24 +148,29 @@ class Root(Base):
         return self.replace(**new)
 
     def after(self, before: Self, time: float) -> Self:
-        """Return this sky as it goes on from another: a change of wind without a jump.
+        """Return this sky with a `drift` that continues the motion of another sky.
 
-        At `time` all that winds carry is where `before` has it, and from then on the winds of this
-        sky carry it on. Only `drift` changes, in f64: the result may be asked for any time, and a
-        picture a month on is as exact as the first. Times before `time` are what these winds would
-        have come from: take `before` there.
+        Clouds do not jump when the winds change: at `time` everything that winds carry is at its
+        position in `before`, and the winds of this sky carry it from there. Only `drift` differs
+        between this sky and the result. `drift` is computed in float64, so that a picture a month
+        later is as exact as the first. The result holds for any time; before `time` it
+        extrapolates the new winds backward, so use `before` there.
 
         Parameters
         ----------
         before : Params
-            The sky until then.
+            The sky up to `time`.
         time : float
-            When the winds change, in seconds, as for `Renderer.render`.
+            Time of the change of wind in seconds, as for `Renderer.render`.
+
+        Returns
+        -------
+        Params
 
         Raises
         ------
         ParameterError
-            For what is no sky or no finite time.
+            If `before` is no `Params` or `time` is not finite.
 
         Examples
         --------
@@ -163,9 +188,9 @@ class Root(Base):
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain values by group and field name; arrays as nested lists.
+        """Return built-in Python values by group and field name; arrays become nested lists.
 
-        A mixture of weathers is a list of their values, each with its ``weight``.
+        ``weather_mix`` becomes a list of weathers, each with its ``weight``.
         """
         groups = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
         mixture = groups.pop("weather_mix", ())
@@ -176,7 +201,17 @@ class Root(Base):
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
-        """Make parameters from what `to_dict` returned; fields left out have their defaults."""
+        """Return parameters from the result of `to_dict`; missing fields have their defaults.
+
+        Raises
+        ------
+        ParameterError
+            For an unknown field, or a value that is not allowed.
+
+        Examples
+        --------
+        >>> params = nubis.Params.from_dict({"clouds": {"coverage": 0.7}})
+        """
         if not isinstance(values, Mapping):
             raise ParameterError(f"values = {values!r} is not allowed: it must be a mapping")
         changes = {}
@@ -192,21 +227,22 @@ class Root(Base):
                 continue
             for name, value in fields.items():
                 changes[f"{block}.{name}"] = value
-        # Last, since a mixture must fit the weather that it goes with.
+        # Last: a mixture is validated against `weather`.
         return cls().with_(**changes).replace(**whole)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write all parameters to a TOML file.
 
-        Arrays of more than 4096 numbers are put beside it, into ``<file>.<group>.<field>.<check
-        sum>.npy``, and the file holds their names: move them together. Arrays of earlier versions
-        of the file stay there, as copies of it may name them. Each file is written under another
-        name and renamed when it is whole, and the TOML file is the last.
+        Arrays of more than 4096 numbers are written to ``<file>.<group>.<field>.<checksum>.npy`` in
+        the same folder, and the TOML file refers to them by name: move the files together. Arrays
+        of earlier versions of the file are kept, because copies of the file may refer to them.
+        Writing is atomic: each file is written under a temporary name and renamed when complete,
+        the TOML file last.
 
         Raises
         ------
         FileError
-            When a file cannot be written.
+            If a file cannot be written.
 
         Examples
         --------
@@ -214,7 +250,7 @@ class Root(Base):
         >>> nubis.Params.load("sky.toml") == params
         True
         """
-        import tomli_w  # here, as `tomllib` below: a first picture need not wait for them
+        import tomli_w  # here, as `tomllib` below, to keep `import nubis` fast
 
         target = Path(path)
 
@@ -241,22 +277,29 @@ class Root(Base):
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
-        """Read parameters from a TOML file; fields left out have their defaults.
+        """Read parameters from a TOML file; missing fields have their defaults.
 
-        An array is nested lists, or the name of a ``.npy`` file in the folder of the TOML file.
+        An array is given as nested lists, or as the name of a ``.npy`` file in the folder of the
+        TOML file.
 
         Raises
         ------
         ParameterError
-            For what is no TOML file, and values that are not allowed.
+            If the file is not TOML, a field is unknown, or a value is not allowed.
         FileError
-            When an array that is named cannot be read.
+            If a ``.npy`` file cannot be read.
+        OSError
+            If the TOML file cannot be read.
+
+        Examples
+        --------
+        >>> params = nubis.Params.load("sky.toml")
         """
         import tomllib
 
         source = Path(path)
         try:
-            # Editors on Windows begin files with a mark.
+            # Editors on Windows may write a byte-order mark.
             values = tomllib.loads(source.read_bytes().decode("utf-8-sig"))
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise ParameterError(
@@ -265,12 +308,12 @@ class Root(Base):
         return cls.from_dict({k: _with_arrays(source, k, v) for k, v in values.items()})
 
 
-# Numbers of an array that a person may want to read and change in a TOML file.
+# Largest number of elements of an array that is written into the TOML file itself.
 _LONGEST_INSIDE = 4096
 
 
 def _write_beside(target: Path, field: str, array: np.ndarray[Any, Any]) -> str:
-    """Write an array of the file `target`; return its name, by its content."""
+    """Write an array of the file `target`; return its name, which holds its checksum."""
     out = io.BytesIO()
     np.save(out, array, allow_pickle=False)
     content = out.getvalue()
@@ -280,7 +323,7 @@ def _write_beside(target: Path, field: str, array: np.ndarray[Any, Any]) -> str:
 
 
 def _with_arrays(source: Path, name: str, value: Any) -> Any:
-    """A value of the file `source`, with arrays in place of the names of their files."""
+    """A value of the file `source`, with names of ``.npy`` files replaced by their arrays."""
     if isinstance(value, Mapping):
         return {k: _with_arrays(source, f"{name}.{k}", v) for k, v in value.items()}
     if isinstance(value, list) and value and isinstance(value[0], Mapping):
@@ -300,7 +343,7 @@ def _with_arrays(source: Path, name: str, value: Any) -> Any:
 
 
 def _mixture(value: Any) -> tuple[tuple[Block, float], ...]:
-    from nubis.params import Weather  # which imports this
+    from nubis.params import Weather  # here: params.py imports this module
 
     allowed = "a tuple of pairs (nubis.Weather, weight from 0 to 1)"
     try:

@@ -2,27 +2,27 @@
 
 
 class NubisError(Exception):
-    """Base of all errors that nubis raises."""
+    """Base class of all errors that nubis raises."""
 
 
 class ParameterError(NubisError, ValueError):
-    """An argument is not allowed: names the field, the value and what is allowed.
+    """A value that is not allowed. The message names the field, the value and the allowed range.
 
     Raised before any GPU work.
     """
 
 
 class AdapterError(NubisError, RuntimeError):
-    """No usable adapter, or not the one asked for: lists those found and what would help."""
+    """No usable or no matching adapter. The message lists those found and a package that helps."""
 
 
 class DeviceError(NubisError, RuntimeError):
-    """The device was lost or is out of memory; a new `Renderer` works."""
+    """The device is lost or out of memory. A new `Renderer` recovers."""
 
 
 class ForkError(NubisError, RuntimeError):
-    """Used in a forked child, where the driver's threads do not exist: start workers by spawn."""
+    """Use in a forked child, which lacks the threads of the driver. Start workers by spawn."""
 
 
 class FileError(NubisError, OSError):
-    """A file could not be written or read."""
+    """A file cannot be written or read."""

@@ -1,4 +1,4 @@
-"""Linear pictures to screens and files, and weather maps from files."""
+"""Tone mapping, exposure, image files, and weather maps from files."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from nubis import _nubis
 from nubis._arrays import numbers
 from nubis._errors import FileError, ParameterError
 
-#: What a picture's file can end in.
+#: Supported file extensions.
 ENDINGS = (".png", ".exr", ".hdr", ".npy")
 
 
@@ -25,34 +25,35 @@ def to_srgb8(
     *,
     dither: bool = True,
 ) -> npt.NDArray[np.uint8]:
-    """Return 8-bit sRGB pixels: the only place where anything is clipped or gamma-encoded.
+    """Return 8-bit sRGB pixels of a linear frame: exposure, tone map, sRGB encoding, dithering.
+
+    This is the only function that clips or gamma-encodes.
 
     Parameters
     ----------
     frame : array-like, shape (H, W, 3) or (H, W, 4)
-        Scene-linear radiance with Rec. 709 primaries. Where there is alpha, the radiance is
-        premultiplied by it, as of all pictures here.
+        Scene-linear radiance with Rec. 709 primaries, premultiplied by alpha where there is one.
     exposure : float
-        Stops: 1 doubles the light.
+        Exposure in stops: 1 doubles the radiance.
     tonemap : {"agx", "aces", "none"}
-        AgX (Sobotka, in Wrensch's polynomial form), ACES (Hill's fit), or plain clipping.
+        AgX (Sobotka 2022, polynomial of Wrensch 2023), ACES 1.0 (fit of Hill 2016), or plain
+        clipping.
     dither : bool
-        Adds blue noise of half a step to each side before rounding, the same in each picture, so
-        that slow gradients have no bands. Whole steps, such as black and white, stay as they are;
-        with False every number goes to the nearest step.
+        Adds blue noise of up to half a quantization step in both directions before rounding,
+        against banding. The noise is the same in every picture. Exact 8-bit values, such as black
+        and white, are not changed. False rounds to the nearest value.
 
     Returns
     -------
     array of uint8, shape (H, W, 3) or (H, W, 4)
-        Alpha is linear, rounded, and the colours are no longer multiplied by it (as in a PNG, in
-        Pillow and in matplotlib): they are divided before the tone map, which is for the radiance
-        of what is there. Where alpha is 0 they are those of no light.
+        sRGB-encoded colour and linear alpha. Colour is not premultiplied (as in PNG, Pillow and
+        matplotlib): it is divided by alpha before the tone map. Where alpha is 0 it is that of
+        zero radiance. Infinite radiance is white.
 
     Raises
     ------
     ParameterError
-        For an array that is no picture or has NaN in it, and other arguments that are not allowed.
-        Infinite radiance is white.
+        For another shape, NaN, an unknown tone map, or another value that is not allowed.
 
     Examples
     --------
@@ -72,30 +73,33 @@ def auto_exposure(
     low: float = 5.0,
     high: float = 95.0,
 ) -> float:
-    """Return the exposure, in stops, at which a picture is neither too dark nor too bright.
+    """Return the exposure in stops that maps the log-average luminance of a frame to `key`.
 
-    It brings the mean of the logarithm of the luminance to that of `key` (Reinhard et al. 2002).
-    Pixels without light count nothing, and neither do the darkest and the brightest of the others:
-    the sun's disc and its glare change nothing.
+    The log-average (Reinhard et al. 2002) is taken over the pixels of non-zero luminance between
+    the percentiles `low` and `high`, so that the sun's disc and its glare do not change it.
 
     Parameters
     ----------
     frame : array-like, shape (H, W, 3) or (H, W, 4)
         Scene-linear radiance with Rec. 709 primaries.
     key : float
-        What the mean becomes: 0.18 is middle grey, less a night.
+        Log-average luminance after exposure: 0.18 is middle grey; a lower key is a night.
     low, high : float
-        Percent of the pixels with light below and from which on they are left out.
+        Percentiles of the pixels of non-zero luminance; pixels outside are ignored.
 
     Returns
     -------
     float
-        Stops, for `to_srgb8` and `save`; 0 where there is no light.
+        Exposure in stops, for `to_srgb8` and `save`; 0 for a frame without light.
 
     Raises
     ------
     ParameterError
-        For an array that is no picture, and shares that leave nothing.
+        For another shape, or percentiles that leave no pixels.
+
+    Examples
+    --------
+    >>> stops = nubis.auto_exposure(renderer.render(camera, params))
     """
     wanted = _nubis.number("key", key)
     first, last = _nubis.number("low", low), _nubis.number("high", high)
@@ -103,7 +107,7 @@ def auto_exposure(
 
 
 def heat(counts: npt.NDArray[np.uint32], white: int = 1000) -> npt.NDArray[np.uint8]:
-    """Return 8-bit pixels: black where a count is 0, then red, yellow, white from `white` on."""
+    """Return a heat map as 8-bit RGB: black at a count of 0, red, yellow, white from `white` on."""
     ramp = 3 * counts[..., None] / white - np.arange(3)
     pixels: npt.NDArray[np.uint8] = np.rint(255 * ramp.clip(0, 1)).astype(np.uint8)
     return pixels
@@ -117,30 +121,30 @@ def save(
     tonemap: Literal["agx", "aces", "none"] = "agx",
     dither: bool = True,
 ) -> None:
-    """Write a picture; the ending says how.
+    """Write a frame to a file, in the format of the file extension.
 
-    ``.png`` is made by `to_srgb8` (alpha is kept where any pixel is not opaque); ``.exr``
-    (float32), ``.hdr`` (Radiance, 8 bits and a common exponent, no alpha, nothing below 0) and
-    ``.npy`` stay linear. The file is written under another name beside its place and renamed when
-    it is whole: who reads finds the old picture or the new one, whatever happens meanwhile.
+    ``.png`` is tone-mapped by `to_srgb8`; alpha is written if any pixel is not opaque. ``.exr``
+    (float32), ``.hdr`` (Radiance RGBE, without alpha and negative values) and ``.npy`` are linear.
+    Writing is atomic: the file is written under a temporary name and renamed when complete.
 
     Parameters
     ----------
     path : path
-        Ends in .png, .exr, .hdr or .npy.
+        Path that ends in .png, .exr, .hdr or .npy.
     frame : array-like, shape (H, W, 3) or (H, W, 4)
-        Linear radiance, premultiplied by alpha where there is one; finite.
+        Scene-linear radiance with Rec. 709 primaries, premultiplied by alpha where there is one;
+        finite.
     exposure : float or "auto"
-        Stops, or `auto_exposure` of the frame (png).
+        Exposure in stops, or "auto" for `auto_exposure` of the frame (png).
     tonemap, dither
         As for `to_srgb8` (png).
 
     Raises
     ------
     ParameterError
-        For another ending, or an array that is no picture of finite numbers.
+        For another extension, another shape, or values that are not finite.
     FileError
-        When the file cannot be written.
+        If the file cannot be written.
 
     Examples
     --------
@@ -169,12 +173,12 @@ def save(
 
 
 def check_target(path: str | os.PathLike[str]) -> None:
-    """Raise what `save` would for a path: asked before pictures are made that would be lost."""
+    """Raise the errors of `save` for a path, ahead of a render that could not be written."""
     _nubis.check_target(_check_ending(path))
 
 
 def npy(array: npt.NDArray[Any]) -> bytes:
-    """The bytes of a file as `numpy.save` writes it."""
+    """Contents of a ``.npy`` file of an array."""
     out = io.BytesIO()
     np.save(out, array, allow_pickle=False)
     return out.getvalue()
@@ -196,27 +200,32 @@ def _check_switch(name: str, value: Any) -> None:
 
 
 def load_map(path: str | os.PathLike[str]) -> npt.NDArray[np.float32]:
-    """Read a weather map from a picture, for `weather.map`.
+    """Read a weather map from an image file, for `weather.map`.
 
     Parameters
     ----------
     path : path
-        A ``.png`` (8 or 16 bits), ``.exr``, ``.hdr`` or ``.npy`` file. Red is the coverage, green
-        the type, blue the precipitation; one channel is the coverage alone, with type 0.5 and no
-        precipitation. Alpha is left out. Whole numbers are parts of their largest, 255 or 65535,
-        and no gamma is undone; floats are taken as they are.
+        A ``.png`` (8 or 16 bits), ``.exr``, ``.hdr`` or ``.npy`` file. Red is coverage, green type,
+        blue precipitation. A single channel is coverage, with type 0.5 and precipitation 0. Alpha
+        is ignored. Integers are divided by their maximum, 255 or 65535, without decoding of gamma;
+        floats are used unchanged.
 
     Returns
     -------
     map : array of float32, shape (H, W, 3)
-        0 to 1; row 0, the top of the picture, is the north.
+        Coverage, type and precipitation, 0 to 1; row 0, the top of the image, is in the north.
 
     Raises
     ------
     ParameterError
-        For another ending, a file that is none of these, or values that are not from 0 to 1.
+        For another extension, a file of another format, more than 8192 rows or columns, or values
+        outside 0 to 1.
     FileError
-        When the file cannot be read.
+        If the file cannot be read.
+
+    Examples
+    --------
+    >>> weather = nubis.Weather(map=nubis.load_map("weather.png"))
     """
     source = _check_ending(path)
     npy_file = source.suffix.lower() == ".npy"
@@ -233,7 +242,7 @@ def load_map(path: str | os.PathLike[str]) -> npt.NDArray[np.float32]:
 
 
 def _load_array(path: Path) -> npt.NDArray[np.float32]:
-    """Shape (H, W, 1) or (H, W, 3)."""
+    """Array of a ``.npy`` file as float32, shape (H, W, 1) or (H, W, 3)."""
     try:
         array = np.load(path, allow_pickle=False)
     except OSError as error:

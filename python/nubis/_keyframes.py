@@ -1,4 +1,4 @@
-"""Skies by time."""
+"""Keyframe animation of skies."""
 
 from __future__ import annotations
 
@@ -15,36 +15,36 @@ from nubis.params import Params
 
 
 class Keyframes:
-    """Skies at some times, and by `lerp` those between them.
+    """Skies at key times, interpolated by `lerp` between them.
 
-    Winds that change carry the clouds on from where they are: how far is the integral of the winds
-    that `at` has at each moment, exact to f64, so that any time may be asked for in any order. It
-    goes into `Params.drift`. A sky of `at` belongs to its time: it is for
+    The displacement of the clouds is the integral of the interpolated winds, in float64 and
+    independent of the order of evaluation: a change of wind does not make the clouds jump. `at`
+    stores it in `Params.drift`. A sky of `at` is valid at its time alone: render it with
     ``render(..., time=seconds * time)``.
 
     Parameters
     ----------
     keys : iterable of (float, Params)
-        Times, in any unit and order but each once, and their skies.
+        Key times, in any unit and order, and their skies. Times are unique.
     easing : {"linear", "smooth"}
-        How a sky goes to the next: evenly, or slowly away from the one and slowly up to the other,
-        without a kink at the keys.
+        Interpolation in time: linear, or smoothstep, whose derivative is 0 at the keys.
     seconds : float
-        How many seconds of `Renderer.render` a unit of the times of the keys is: 1 for times in
-        seconds, 3600 for hours. Only skies whose winds change depend on it.
+        Seconds of `Renderer.render` per unit of key time: 1 for times in seconds, 3600 for hours.
+        It affects only skies whose winds change.
 
     Attributes
     ----------
     keys : tuple of (float, Params)
-        The same, in the order of time.
+        Keys in the order of time.
     easing : str
     seconds : float
 
     Raises
     ------
     ParameterError
-        For no keys at all, two at one time, and what is no time or sky; for winds that wander and
-        change over more than 16,384 times `wander.period` from one key to the next.
+        Without keys, for two keys of the same time, a time that is not finite, or a key that is no
+        `Params`; if winds that wander change over more than 16,384 times `wander.period` between
+        two keys.
 
     Examples
     --------
@@ -57,7 +57,7 @@ class Keyframes:
     keys: tuple[tuple[float, Params], ...]
     easing: Literal["linear", "smooth"]
     seconds: float
-    # How far the winds have carried things at each key; empty where all keys have the same.
+    # Displacements by the winds at each key; empty if all keys have the same winds.
     _carried: list[list[float]]
 
     def __init__(
@@ -126,29 +126,37 @@ class Keyframes:
         return f"Keyframes({list(self.keys)!r}, easing={self.easing!r}, seconds={self.seconds!r})"
 
     def at(self, time: float) -> Params:
-        """Return the sky at a time: before the first key the first's, after the last the last's."""
+        """Return the sky at a time, in the unit of the key times.
+
+        The first sky holds before the first key, the last sky after the last key.
+
+        Raises
+        ------
+        ParameterError
+            If the time is not finite.
+        """
         now = _time("time", time)
         index = bisect_right([key for key, _ in self.keys], now)
         if index in (0, len(self.keys)):
-            # What follows the last key is carried on from there.
+            # After the last key its winds go on from the displacements at that key.
             (key, sky) = self.keys[max(index - 1, 0)]
             return self._drifted(sky, index - 1, key) if index else sky
         (start, before), (end, after) = self.keys[index - 1], self.keys[index]
-        # Halves, so that no difference is beyond the largest float.
+        # Halved, so that no difference overflows.
         share = (0.5 * now - 0.5 * start) / (0.5 * end - 0.5 * start)
         if self.easing == "smooth":
             share = share * share * (3 - 2 * share)
         return self._drifted(lerp(before, after, min(max(share, 0.0), 1.0)), index - 1, now)
 
     def _drifted(self, sky: Params, index: int, time: float) -> Params:
-        """The sky of a time at a key or before the next, with what has been carried until then."""
+        """The sky with the drift of a time between the key `index` and the next."""
         if not self._carried:
             return sky
         fields = _nubis.drift_of(sky, self.seconds * time, self._carried_at(index, time))
         return sky.with_(**{f"drift.{name}": value for name, value in fields.items()})
 
     def _carried_at(self, index: int, time: float) -> list[float]:
-        """How far things have been carried at a time at a key or before the next."""
+        """Displacements at a time between the key `index` and the next."""
         carried = self._carried[index]
         start, before = self.keys[index]
         if time == start:

@@ -1,4 +1,4 @@
-"""Skies between skies."""
+"""Interpolation of skies."""
 
 from __future__ import annotations
 
@@ -16,26 +16,41 @@ from nubis.params import Params, UpperClouds
 
 
 def lerp(a: Params, b: Params, t: float) -> Params:
-    """Return the sky between two: `a` at t = 0, `b` at t = 1, and smoothly from one to the other.
+    """Return the interpolation of two skies: `a` at t = 0, `b` at t = 1.
 
-    - Numbers and vectors go in a straight line; compass directions (azimuths, winds) along the
-      shorter arc, clockwise if both are equally long. What `a` and `b` allow is allowed between.
-    - The weather maps blend into each other (`Params.weather_mix`): clouds of the one vanish while
-      those of the other appear, whatever the two weathers are. Only weathers of another `extent`,
-      `edge` or `broad_extent` cannot be mixed: they switch.
-    - Arrays of equal shape go in a straight line.
-    - What has nothing between switches from `a` to `b` at t = 0.5: words (models, noises), True and
-      False, whole numbers (seeds, octaves, sizes), the volume. Keep it equal for a smooth sky.
+    - Numbers, vectors and arrays of equal shape are interpolated linearly. Every result is an
+      allowed value.
+    - Compass directions (azimuths, winds) are interpolated along the shorter arc, clockwise if both
+      arcs are equally long.
+    - Weather maps are blended (`Params.weather_mix`): clouds of one map vanish while clouds of the
+      other appear. Weathers of different `extent`, `edge` or `broad_extent` cannot be blended and
+      switch at t = 0.5.
+    - Discrete fields switch from `a` to `b` at t = 0.5: names (models, noises), booleans, integers
+      (seeds, octaves, sizes) and the volume. Keep them equal for a continuous sky.
 
-    Winds are how fast clouds go, and where they are is that times the time since 0 s, and
-    `Params.drift`. `lerp` knows no time: after hours another share of two winds has the clouds
-    elsewhere by kilometres. Over time use `Keyframes`, which carry them on, or `Params.after`.
+    Clouds are displaced by wind speed times the time since 0 s, plus `Params.drift`. `lerp` does
+    not know the time: hours after 0 s, a small change of `t` between two winds moves the clouds by
+    kilometres. For skies that change in time use `Keyframes` or `Params.after`, which keep the
+    displacement continuous.
 
     Parameters
     ----------
     a, b : Params
     t : float
-        0 to 1.
+        Interpolation parameter, 0 to 1.
+
+    Returns
+    -------
+    Params
+
+    Raises
+    ------
+    ParameterError
+        If `a` or `b` is no `Params`, or `t` is outside 0 to 1.
+
+    Examples
+    --------
+    >>> dusk = nubis.lerp(nubis.presets["scattered"], nubis.presets["overcast"], 0.3)
     """
     for name, value in (("a", a), ("b", b)):
         if not isinstance(value, Params):
@@ -63,8 +78,10 @@ def lerp(a: Params, b: Params, t: float) -> Params:
 
 
 def _above(deck: UpperClouds, lowest: float) -> UpperClouds:
-    """The deck above the clouds: where the other sky has none, those may stand higher than it does,
-    and it comes from above.
+    """The upper deck, raised to the top of the lower one if that is higher.
+
+    Without an upper deck in one of the skies, its lower deck may be higher than the upper deck of
+    the other sky.
     """
     if deck.coverage == 0 or deck.base >= lowest:
         return deck
@@ -78,7 +95,7 @@ def _block(a: Block, b: Block, t: float) -> Block:
     for field in dataclasses.fields(a):
         values[field.name] = _value(field.name, getattr(a, field.name), getattr(b, field.name), t)
     if {"base", "top"} <= values.keys():
-        # A shell that is as thin as f32 knows may be between two altitudes that f32 does.
+        # Between two decks as thin as float32 resolves, base and top may round to the same.
         base = np.float32(values["base"])
         values["top"] = max(values["top"], float(np.nextafter(base, np.float32(np.inf))))
     return type(a)(**values)
@@ -95,12 +112,12 @@ def _value(name: str, a: Any, b: Any, t: float) -> Any:
 
 
 def _line(a: float, b: float, t: float) -> float:
-    # What is equal stays so to the bit, and rounding leaves no range.
+    # Clamped: equal values stay bit-exact, and rounding leaves no allowed range.
     return min(max(a + t * (b - a), min(a, b)), max(a, b))
 
 
 def _arc(a: float, b: float, t: float) -> float:
-    """Degrees on the shorter arc, within 360 of north."""
+    """Interpolation of degrees along the shorter arc, within -360 to 360."""
     turn = 180 - (180 - (b - a)) % 360
     angle = a + t * turn
     return angle - math.copysign(360, angle) if abs(angle) > 360 else angle

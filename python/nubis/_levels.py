@@ -1,4 +1,4 @@
-"""From one number to a cloud of one's own: presets, and `sky`, which puts the levels together."""
+"""Presets, and `sky`: parameters from a cover, a preset, a map, a volume or single fields."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def _make() -> dict[str, Params]:
     return {name: fair.with_(**fields) for name, fields in skies.items()}
 
 
-#: Skies by name: clouds of each kind, with the default sun, wind and air.
+#: Preset skies by name: kinds of clouds, with the default sun, wind and atmosphere.
 presets: Mapping[str, Params] = Named("preset", _make())
 
 
@@ -71,31 +71,40 @@ def sky(
     volume: DensityGrid | None = None,
     **fields: Any,
 ) -> Params:
-    """Return the parameters of a sky, from as little or as much as is said of it.
+    """Return the parameters of a sky, from any of five levels of detail.
 
-    Each level overrides the ones before it in what it sets, and leaves all else as it is.
+    Levels are applied in the order preset, cover, map, volume, fields. Each overrides the fields
+    that it sets and leaves all others unchanged.
 
     Parameters
     ----------
     cover : float, optional
-        How much cloud, from 0, clear, to 1, overcast. Sets ``clouds.coverage``.
+        Cloud cover: 0 is clear, 1 overcast. Sets ``clouds.coverage``.
     preset : str, optional
-        A name in `presets`. Sets every field, to what it is in ``presets[preset]``; the amount of
-        cloud is the preset's own where no `cover` is given, and else the `cover`.
+        Name of a sky in `presets`. Sets every field. `cover`, if given, replaces the cover of the
+        preset.
     map : array-like, shape (H, W, 3), optional
-        Coverage, type and precipitation by place, row 0 in the north. Sets ``weather.map``, and
-        takes it as it is, whatever `cover` and `preset` say of these: ``clouds.coverage`` 0.5,
+        Weather map: coverage, type and precipitation, 0 to 1, row 0 in the north. Sets
+        ``weather.map``, and the values that leave the map unchanged: ``clouds.coverage`` 0.5,
         ``clouds.type`` 0.5, ``clouds.precipitation`` 1.
     volume : DensityGrid, optional
-        A cloud of your own. Sets ``volume``: it takes the place of all other clouds. High ones come
-        with it where ``high_clouds.with_volume`` is True.
+        Extinction grid that replaces all clouds. Sets ``volume``. High clouds are drawn with it if
+        ``high_clouds.with_volume`` is True.
     **fields
-        Deep fields, which override all of these: ``**{"sun.elevation": 5.0}``.
+        Single fields by dotted names, such as ``**{"sun.elevation": 5.0}``.
+
+    Returns
+    -------
+    Params
 
     Raises
     ------
     ParameterError
-        For a value that is not allowed, and for a name that is no preset or field.
+        For a value that is not allowed, an unknown preset or an unknown field.
+
+    Examples
+    --------
+    >>> params = nubis.sky(0.4, preset="storm", **{"sun.elevation": 5.0})
     """
     params = Params()
     if preset is not None:

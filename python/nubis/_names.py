@@ -1,4 +1,4 @@
-"""Names that are not there: what may have been meant, and all that there are."""
+"""Error messages for unknown names: the closest match and all names that exist."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from nubis._errors import ParameterError
 
 Value = TypeVar("Value")
 
-# Fields that there are no more, and why.
+# Removed fields, and the reason.
 GONE = {
     "sun_volume": 'nubis.quality("balanced") takes less time and, but for storms, errs less',
     "view_distance": "clouds are drawn to the horizon from any altitude",
@@ -18,17 +18,17 @@ GONE = {
 
 
 class UnknownKeyError(ParameterError, KeyError):
-    """A name that a table of the package does not have."""
+    """An unknown key of a table of the package."""
 
     __str__ = Exception.__str__  # KeyError's is a repr
 
 
 class UnknownArgumentError(ParameterError, TypeError):
-    """A keyword that a class of parameters does not take."""
+    """An unknown keyword of a parameter class."""
 
 
 def unknown(name: str, given: str, names: Iterable[str], what: str = "one of") -> str:
-    """The words of an error for the argument `name`, given a name that is none of `names`."""
+    """Error message for the argument `name`, whose value `given` is none of `names`."""
     known = list(names)
     near = difflib.get_close_matches(given.lower(), known, n=1)
     hint = f"; did you mean {near[0]!r}?" if near else ""
@@ -36,7 +36,7 @@ def unknown(name: str, given: str, names: Iterable[str], what: str = "one of") -
 
 
 def unknown_field(name: str, given: str, names: Iterable[str]) -> str:
-    """The same for a field, whose path is `given`."""
+    """Error message for a field with the unknown path `given`."""
     known = list(names)
     if why := GONE.get(given.rpartition(".")[2]):
         return f"{name} is not allowed: it is gone, as {why}; it must be one of {', '.join(known)}"
@@ -44,7 +44,7 @@ def unknown_field(name: str, given: str, names: Iterable[str]) -> str:
 
 
 class Named(Mapping[str, Value]):
-    """A table that cannot be changed, and that says what it has where a name is not in it."""
+    """An immutable mapping; the error for an unknown key lists the keys."""
 
     def __init__(self, kind: str, values: Mapping[str, Value]) -> None:
         self._kind, self._values = kind, dict(values)
@@ -73,7 +73,7 @@ class Named(Mapping[str, Value]):
 
 
 def refuse_arguments(kind: str, given: Iterable[str], names: Iterable[str]) -> None:
-    """Raise for the first keyword that is none of `names`."""
+    """Raise `UnknownArgumentError` for the first keyword that is none of `names`."""
     known = list(names)
     for name in given:
         if name not in known:

@@ -1,4 +1,4 @@
-"""The compiled renderer: crates/clouds_py/src/lib.rs."""
+"""The compiled module (crates/clouds_py/src/lib.rs)."""
 
 from os import PathLike
 from pathlib import Path
@@ -44,7 +44,7 @@ _CameraState: TypeAlias = tuple[int, _Vector, _Vector, _Vector, _Vector, float]
 
 @final
 class Camera:
-    """A camera: see `Camera.look_at`, `from_matrix`, `equirect` and `fisheye`."""
+    """A camera. Constructors: `look_at`, `from_matrix`, `equirect` and `fisheye`."""
 
     @staticmethod
     def look_at(
@@ -53,18 +53,27 @@ class Camera:
         up: npt.ArrayLike | None = None,
         fov_y: float | None = None,
     ) -> Camera:
-        """A pinhole camera.
+        """Return a pinhole camera that looks at a point.
 
         Parameters
         ----------
         eye : (3,) floats
-            Position in world metres (x east, y north, z up).
+            Camera position in world metres (x east, y north, z up).
         target : (3,) floats
-            A point in the middle of the picture.
+            World point at the centre of the picture.
         up : (3,) floats
-            A direction that is up in the picture; (0, 0, 1) if left out.
+            Up direction of the picture; (0, 0, 1) if left out.
         fov_y : float
             Vertical field of view in degrees, above 0 and at most 179; 60 if left out.
+
+        Raises
+        ------
+        ParameterError
+            For a value that is not allowed.
+
+        Examples
+        --------
+        >>> camera = nubis.Camera.look_at(eye=(0, 0, 2), target=(0, 1000, 400), fov_y=60.0)
         """
 
     @staticmethod
@@ -73,49 +82,55 @@ class Camera:
         fov_y: float | None = None,
         convention: Literal["opengl", "opencv"] = "opengl",
     ) -> Camera:
-        """A pinhole camera from a matrix.
+        """Return a pinhole camera from a camera-to-world matrix.
 
         Parameters
         ----------
         world_from_camera : (4, 4) floats
-            Takes camera coordinates to world metres; a rigid motion.
+            Rigid transform from camera coordinates to world metres.
         fov_y : float
             Vertical field of view in degrees, above 0 and at most 179; 60 if left out.
         convention : {"opengl", "opencv"}
-            The camera's axes: +x right, +y up, looking down -z; or +x right, +y down, looking down
-            +z.
+            Axes of the camera. OpenGL: +x right, +y up, view direction -z. OpenCV: +x right, +y
+            down, view direction +z.
+
+        Raises
+        ------
+        ParameterError
+            For a value that is not allowed, or a matrix that is no rigid transform.
         """
 
     @staticmethod
     def equirect(eye: npt.ArrayLike) -> Camera:
-        """The whole sphere around `eye` by longitude and latitude.
+        """Return an equirectangular camera: the whole sphere around `eye`, in world metres.
 
-        The image's centre is north, right is clockwise seen from above (east), its top row the
-        zenith. Twice as wide as high gives square pixels.
+        The centre of the picture is north, its right half east (clockwise seen from above), its top
+        row the zenith. A width of twice the height gives square pixels.
         """
 
     @staticmethod
     def fisheye(
         eye: npt.ArrayLike, up: npt.ArrayLike | None = None, fov: float | None = None
     ) -> Camera:
-        """An equidistant all-sky camera.
+        """Return an equidistant fisheye (all-sky) camera at `eye`, in world metres.
 
-        The image's centre is `up` (the zenith if left out), its top as far north as can be; as on a
-        photograph of the sky, east is on the left. `fov` degrees (180 if left out) span the shorter
-        side; outside that circle pixels are 0 with alpha 0.
+        The centre of the picture is the direction `up` (the zenith if left out). Its top is the
+        direction closest to north; east is on the left, as on a photograph of the sky. `fov`
+        degrees (180 if left out) span the shorter side. Pixels outside that circle are 0 with alpha
+        0.
         """
 
     @property
     def kind(self) -> Literal["perspective", "equirect", "fisheye"]:
-        """The projection: "perspective", "equirect" or "fisheye"."""
+        """Projection: "perspective", "equirect" or "fisheye"."""
 
     @property
     def eye(self) -> _Vector:
-        """Position in world metres."""
+        """Camera position in world metres."""
 
     @property
     def forward(self) -> _Vector:
-        """Unit vector toward the middle of the picture."""
+        """Unit vector toward the centre of the picture."""
 
     @property
     def up(self) -> _Vector:
@@ -127,10 +142,10 @@ class Camera:
 
     @property
     def fov(self) -> float:
-        """Field of view in degrees: vertical, of a fisheye its whole circle."""
+        """Field of view in degrees: vertical, or of the whole circle of a fisheye."""
 
     def matrix(self) -> list[list[float]]:
-        """The 4 x 4 matrix from camera coordinates (OpenGL) to world coordinates, by rows."""
+        """Camera-to-world matrix, 4 x 4, by rows; OpenGL camera coordinates."""
 
     def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
@@ -140,33 +155,38 @@ class Camera:
 
 @final
 class DensityGrid:
-    """A cloud of your own: extinction on a grid.
+    """A user-supplied cloud: extinction on a regular grid.
 
     Parameters
     ----------
     extinction : array-like of float32, shape (nz, ny, nx)
-        In 1/m, at the centres of the voxels, trilinear between them; the outermost values hold to
-        the faces of the box, outside there is nothing.
+        Extinction in 1/m at the centres of the voxels, with trilinear interpolation. The outermost
+        values extend to the faces of the box; the extinction outside the box is 0.
     bounds : ((x0, y0, z0), (x1, y1, z1))
-        Lowest and highest corner of the box in world metres. It is straight: the planet's
-        curvature does not bend it, and the wind does not move it.
+        Lowest and highest corner of the box in world metres. The box is a cuboid: it does not
+        follow the curvature of the planet, and the wind does not move it.
+
+    Raises
+    ------
+    ParameterError
+        For a value that is not allowed.
     """
 
     def __new__(cls, extinction: npt.ArrayLike, bounds: npt.ArrayLike) -> DensityGrid: ...
     @property
     def extinction(self) -> npt.NDArray[np.float32]:
-        """Extinction in 1/m, float32 of shape (nz, ny, nx): a copy."""
+        """Copy of the extinction in 1/m, float32 of shape (nz, ny, nx)."""
 
     @property
     def bounds(self) -> tuple[_Vector, _Vector]:
-        """Lowest and highest corner in world metres."""
+        """Lowest and highest corner of the box in world metres."""
 
     @property
     def shape(self) -> tuple[int, int, int]:
         """Shape of the grid: (nz, ny, nx)."""
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values by name: extinction as nested lists."""
+        """Built-in Python values by name; extinction as nested lists."""
 
     def __hash__(self) -> int: ...
     def __eq__(self, other: object, /) -> bool: ...
@@ -174,7 +194,7 @@ class DensityGrid:
 
 @final
 class Renderer:
-    """What `nubis.Renderer` wraps: no defaults, plain values."""
+    """The renderer behind `nubis.Renderer`, without defaults."""
 
     def __new__(cls, width: int, height: int, quality: Quality, adapter: str | None) -> Self: ...
     def render(
@@ -199,7 +219,7 @@ class Renderer:
         npt.NDArray[np.uint32],
         npt.NDArray[np.float32] | None,
     ]:
-        """Clouds with alpha, sky, depth (-1 where there is none), density evaluations."""
+        """Clouds with alpha, sky, depth (-1 without clouds), density evaluations, uncertainty."""
 
     def animate(
         self,
@@ -221,7 +241,7 @@ class Renderer:
     def depth_along(
         self, camera: Camera, directions: npt.ArrayLike, params: Params, time: float
     ) -> npt.NDArray[np.float32]:
-        """Optical depth of all clouds from the eye; -1 where the ground is in the way."""
+        """Optical depth of all clouds along rays from the eye; -1 where the ground is hit."""
 
     def shadow_map(
         self,
@@ -233,7 +253,7 @@ class Renderer:
         size: int,
     ) -> npt.NDArray[np.float32]: ...
     def weather_map(self, params: Params) -> npt.NDArray[np.float32]:
-        """Coverage, type and precipitation as the march reads them, shape (H, W, 3)."""
+        """Weather map that the march reads: coverage, type, precipitation; shape (H, W, 3)."""
 
     def probe(
         self,
@@ -245,20 +265,20 @@ class Renderer:
         time: float,
     ) -> npt.NDArray[np.float32]: ...
     def counters(self) -> list[int]:
-        """Submissions to the device so far, and how often one was waited for."""
+        """Numbers of submissions to the device and of waits for them so far."""
 
     def timings(self) -> list[tuple[str, float]]: ...
     def memory(self) -> list[tuple[str, str, int]]:
-        """What the last picture has left on the GPU: for whom, the variable, bytes."""
+        """GPU memory after the last picture: owner, variable and bytes of each resource."""
 
     def adapter(self) -> dict[str, str]: ...
 
 def adapters() -> list[dict[str, str]]: ...
 def cache_usage() -> tuple[Path | None, int]:
-    """The folder of the cache, None where it is off, and how many bytes are in it."""
+    """Folder of the disk cache, None if it is off, and its size in bytes."""
 
 def carried(params: Params, time: float) -> list[float]:
-    """How far a sky has carried things from 0 s to a time, beside its drift."""
+    """Displacements by the winds of a sky from 0 s to a time, without its drift."""
 
 def carried_between(
     skies: tuple[Params, Params],
@@ -267,33 +287,33 @@ def carried_between(
     swings: float,
     time: float,
 ) -> list[float]:
-    """How far things are carried from the start of the span to a time, on the way from one sky to
-    another, by a wander that is `swings` ahead.
+    """Displacements by the winds that are interpolated between two skies, from the start of the
+    span to a time; the wander starts `swings` periods ahead.
     """
 
 def check(type_name: str, path: str, name: str, value: object) -> Any:
-    """The value in the type that a field of a block holds, or `ParameterError`."""
+    """The value converted to the type of a field of a block, or `ParameterError`."""
 
 def check_params(params: object) -> None: ...
 def check_quality(quality: Quality) -> None: ...
 def clear_cache() -> None: ...
 def drift_after(params: object, before: object, time: float) -> dict[str, Any]:
-    """The fields of the drift with which a sky goes on from another."""
+    """Fields of the drift with which a sky continues the motion of another at a time."""
 
 def drift_of(params: Params, time: float, carried: list[float]) -> dict[str, Any]:
-    """The fields of the drift of a sky that has carried things so far at a time, beside the drift
-    that it has.
+    """Fields of the drift of a sky whose displacements at a time, without its own drift, are
+    `carried`.
     """
 
 def number(name: str, value: object) -> float:
-    """The number that is given for an argument, or `ParameterError`."""
+    """The value of the argument `name` as a float, or `ParameterError`."""
 
 def quality(name: str) -> dict[str, Any]: ...
 def read_pixels(path: str | PathLike[str]) -> npt.NDArray[np.float32]:
-    """The numbers in a PNG, HDR or EXR file, shape (H, W, 1) or (H, W, 3)."""
+    """Pixels of a PNG, HDR or EXR file, shape (H, W, 1) or (H, W, 3)."""
 
 def same_winds(a: Params, b: Params) -> bool:
-    """Whether what winds carry moves alike in two skies."""
+    """Whether two skies have the same winds."""
 
 def to_srgb8(
     frame: npt.NDArray[np.float32], exposure: float, tonemap: str, dither: bool

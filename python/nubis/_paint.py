@@ -1,4 +1,4 @@
-"""Clouds by hand: strokes of a soft brush on a weather map."""
+"""Painting of weather maps with a soft brush."""
 
 from __future__ import annotations
 
@@ -31,39 +31,52 @@ def paint(
     mode: Mode = "add",
     edge: Edge = "repeat",
 ) -> Map:
-    """Return a weather map with a stroke of a soft brush painted on it.
+    """Return a copy of a weather map with one brush stroke painted on it.
 
-    The cloud appears over the place in the world at time 0, and drifts with the weather's wind. A
-    stroke with ``mode="set", amount=0`` keeps a place clear, while `clouds.coverage`, which shifts
-    the whole map, is 0.5 or less.
+    Positions are world positions at time 0; the painted clouds drift with the wind of the weather
+    map. A stroke with ``mode="set", amount=0`` keeps a place clear as long as `clouds.coverage`,
+    which offsets the whole map, is at most 0.5.
 
     Parameters
     ----------
     map : array-like, shape (H, W, 3)
-        Coverage, type and precipitation, 0 to 1, row 0 in the north: your own, from `load_map` or
-        from `Renderer.weather_map`. It stays as it is.
+        Weather map: coverage, type and precipitation, 0 to 1, row 0 in the north; from an array,
+        `load_map` or `Renderer.weather_map`. It is not modified.
     at : (2,) or (N, 2) floats
-        World metres, x east and y north of the middle of the map: a dab, or the corners of a path.
-        A path is one stroke: where it crosses itself it paints once.
+        World metres, x east and y north of the centre of the map: a point, or the vertices of a
+        path. A path is one stroke: where it crosses itself, it paints once.
     radius : float
-        Metres to where the brush ends, at most `extent`.
+        Radius of the brush in metres, at most `extent`.
     extent : float
         `weather.extent` of the map, in metres.
     channel : {"coverage", "type", "precipitation"}
+        Channel of the map that is painted.
     amount : float
-        What is added (-1 to 1), set (0 to 1) or multiplied by (from 0) in the middle of the brush.
+        Value in the centre of the brush that is added (-1 to 1), set (0 to 1) or multiplied by
+        (from 0).
     hardness : float
-        Share of the radius in which the brush is at its full strength, 0 to 1; from there it falls
-        smoothly to the radius.
+        Fraction of the radius, 0 to 1, within which the brush has full strength. Beyond it the
+        strength falls to 0 at the radius by a smoothstep.
     mode : {"add", "set", "multiply"}
     edge : {"repeat", "mirror", "clamp"}
-        `weather.edge` of the map: whether a stroke beyond the edge comes back in, as the map does
-        in the sky. With ``"clamp"`` what lies beyond paints nothing.
+        `weather.edge` of the map: a stroke beyond the edge wraps around, is mirrored, or is
+        clipped.
 
     Returns
     -------
     map : array of float32, shape (H, W, 3)
-        From 0 to 1 again.
+        Values are clamped to 0 to 1.
+
+    Raises
+    ------
+    ParameterError
+        For a value that is not allowed.
+
+    Examples
+    --------
+    >>> weather = renderer.weather_map(params)
+    >>> weather = nubis.paint(weather, (2000, 5000), 1500, extent=params.weather.extent)
+    >>> params = nubis.sky(map=weather)
     """
     texels = _map(map)
     path = _path(at)
@@ -83,20 +96,31 @@ def paint_mask(
     amount: float = 1.0,
     mode: Mode = "add",
 ) -> Map:
-    """Return a weather map that is painted as strongly as a mask says.
+    """Return a copy of a weather map, painted through a mask.
 
     Parameters
     ----------
     map : array-like, shape (H, W, 3)
-        As for `paint`.
+        Weather map, as for `paint`.
     mask : array-like, shape (H, W)
-        How strong the brush is at each texel, 0 to 1.
+        Strength of the brush at each texel, 0 to 1.
     channel, amount, mode
         As for `paint`.
 
     Returns
     -------
     map : array of float32, shape (H, W, 3)
+        Values are clamped to 0 to 1.
+
+    Raises
+    ------
+    ParameterError
+        For a value that is not allowed.
+
+    Examples
+    --------
+    >>> half = np.full(weather.shape[:2], 0.5)
+    >>> weather = nubis.paint_mask(weather, half, mode="multiply", amount=0.0)
     """
     texels = _map(map)
     index = get_args(Channel).index(_one_of("channel", channel, Channel))
@@ -125,7 +149,7 @@ def _stroke(
     hardness: float,
     edge: str,
 ) -> npt.NDArray[np.float64]:
-    """How strong the brush is at the middle of each texel, shape (H, W)."""
+    """Strength of the brush at the centre of each texel, shape (H, W)."""
     height, width = size
     x = ((np.arange(width) + 0.5) / width - 0.5) * extent
     y = (0.5 - (np.arange(height) + 0.5) / height) * extent
@@ -133,7 +157,7 @@ def _stroke(
     corners = path if len(path) > 1 else np.concatenate([path, path])
     for start, end in _pieces(corners, extent):
         low, high = np.minimum(start, end) - radius, np.maximum(start, end) + radius
-        # A texel is seen in the sky once, or once in each tile; in every other one it is mirrored.
+        # A texel has one image in each tile that the stroke reaches, mirrored in every other tile.
         for px in _images(x, low[0], high[0], extent, edge):
             columns = np.flatnonzero((px >= low[0]) & (px <= high[0]))
             for py in _images(y, low[1], high[1], extent, edge):
@@ -151,7 +175,7 @@ def _stroke(
 def _images(
     places: npt.NDArray[np.float64], low: float, high: float, extent: float, edge: str
 ) -> list[npt.NDArray[np.float64]]:
-    """Where the texels of an axis are in each tile that the brush reaches."""
+    """Texel centres of an axis in each tile that the brush reaches."""
     if edge == "clamp":
         return [places]
     first, last = (int(np.floor(v / extent + 0.5)) for v in (low, high))
@@ -162,7 +186,7 @@ def _images(
 def _pieces(
     corners: npt.NDArray[np.float64], longest: float
 ) -> Iterator[tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]]:
-    """Straight parts of a path, none so long that most of the tiles around it are out of reach."""
+    """Segments of a path, split to `longest`, which bounds the tiles that each may reach."""
     for start, end in itertools.pairwise(corners):
         count = max(int(np.ceil(np.hypot(*(end - start)) / longest)), 1)
         yield from itertools.pairwise(np.linspace(start, end, count + 1))
@@ -174,7 +198,7 @@ def _squared_distance(
     start: npt.NDArray[np.float64],
     end: npt.NDArray[np.float64],
 ) -> Any:
-    """From points to a straight line between two."""
+    """Squared distances from points to a line segment."""
     (dx, dy), (rx, ry) = end - start, (x - start[0], y - start[1])
     length = dx * dx + dy * dy
     along = ((rx * dx + ry * dy) / length).clip(0, 1) if length > 0 else 0.0
@@ -182,7 +206,7 @@ def _squared_distance(
 
 
 def _map(value: npt.ArrayLike) -> Map:
-    """A copy, checked."""
+    """A validated copy of a weather map."""
     return _shares("map", value, (None, None, 3)).astype(np.float32)
 
 

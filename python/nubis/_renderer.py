@@ -1,4 +1,4 @@
-"""The renderer that users call."""
+"""The public `Renderer`, named qualities and adapters."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ Shot = (
 )
 Background = Literal["sky"] | None
 
-#: The names of the numerical methods.
+#: Names of the numerical methods.
 QUALITIES = (
     "preview",
     "draft",
@@ -49,11 +49,11 @@ class Adapter(NamedTuple):
     Attributes
     ----------
     name, driver, backend : str
-        As the driver gives them; the backend is ``"vulkan"``, ``"metal"`` or ``"dx12"``.
+        Names reported by the driver; the backend is ``"vulkan"``, ``"metal"`` or ``"dx12"``.
     kind : str
         ``"discrete"``, ``"integrated"``, ``"virtual"``, ``"cpu"`` or ``"other"``.
     pci : str
-        PCI bus address, empty where there is none.
+        PCI bus address; empty if there is none.
     """
 
     name: str
@@ -64,16 +64,39 @@ class Adapter(NamedTuple):
 
 
 def adapters() -> list[Adapter]:
-    """Return the adapters that can be used, best first; an index into them chooses one."""
+    """Return the usable adapters, best first. An index into the list selects one in `Renderer`.
+
+    Examples
+    --------
+    >>> [adapter.kind for adapter in nubis.adapters()]
+    ['cpu']
+    """
     return [Adapter(**adapter) for adapter in _nubis.adapters()]
 
 
 def quality(name: str) -> Quality:
-    """Return the numerical method of that name, to look at or to change.
+    """Return the numerical method of a name, to inspect or to change.
 
-    Names: ``"preview"`` (soft: one pixel in sixteen is marched), ``"draft"``, ``"balanced"``,
-    ``"high"``, ``"reference"`` (converged, slow), and the published settings of the sources,
-    ``"nubis2015"``, ``"thesis2018"``, ``"vsu2022"``.
+    Parameters
+    ----------
+    name : str
+        ``"preview"`` (soft: one pixel in sixteen is marched), ``"draft"``, ``"balanced"``,
+        ``"high"``, ``"reference"`` (converged, slow), or the published settings of a source
+        (docs/sources.md): ``"nubis2015"``, ``"thesis2018"``, ``"vsu2022"``.
+
+    Returns
+    -------
+    Quality
+
+    Raises
+    ------
+    ParameterError
+        For an unknown name.
+
+    Examples
+    --------
+    >>> method = nubis.quality("balanced").replace(contrast=0.0)
+    >>> renderer = nubis.Renderer(960, 540, quality=method)
     """
     if not isinstance(name, str):
         raise ParameterError(f"quality = {name!r} is not allowed: it must be a name or a Quality")
@@ -84,27 +107,33 @@ def quality(name: str) -> Quality:
 
 
 class Renderer:
-    """Makes pictures of one size with one numerical method.
+    """A renderer for pictures of one size with one numerical method.
 
     Parameters
     ----------
     width, height : int
         Size of the pictures in pixels, 1 to 65536.
     quality : str or Quality
-        The numerical method, never the look: a name (see `quality`) or your own.
+        Numerical method: a name (see `quality`) or a `Quality`. It sets accuracy and cost; the
+        appearance of the sky is set by `Params`.
     adapter : int or str, optional
-        Which device: an index into `adapters()`, a kind such as ``"cpu"``, or part of a name,
-        driver or PCI address. Without it the environment variable ``NUBIS_ADAPTER`` says the
-        same, and without that the best is taken: hardware first, else software with a warning.
+        Device: an index into `adapters()`, a kind such as ``"cpu"``, or part of a name, driver or
+        PCI address. Default: the environment variable ``NUBIS_ADAPTER``, in the same form; if it is
+        not set, the best adapter: hardware first, else software with a warning.
 
     Raises
     ------
     ParameterError
         For a size or quality that is not allowed.
     AdapterError
-        When there is no such adapter; lists those found.
+        If there is no such adapter. The message lists those found.
     ForkError
         In a forked child of a process that has used the GPU.
+
+    Examples
+    --------
+    >>> camera = nubis.Camera.look_at(eye=(0, 0, 2), target=(0, 1000, 400))
+    >>> frame = nubis.Renderer(960, 540).render(camera, nubis.Params())
     """
 
     def __init__(
@@ -142,19 +171,19 @@ class Renderer:
 
     @property
     def quality(self) -> Quality:
-        """The numerical method."""
+        """Numerical method of the renderer."""
         return self._quality
 
     @property
     def adapter(self) -> Adapter:
-        """The device that renders."""
+        """Device of the renderer."""
         return Adapter(**self._core.adapter())
 
     @property
     def timings(self) -> dict[str, float]:
-        """Milliseconds on the GPU by pass, for the last picture or answer.
+        """GPU time in milliseconds by pass name, for the last picture or query.
 
-        Bakes appear only when they ran. Empty on adapters without timestamps.
+        Bakes of LUTs are listed only if they ran. Empty on adapters without timestamps.
         """
         return dict(self._core.timings())
 
@@ -168,41 +197,48 @@ class Renderer:
         scene_depth: npt.ArrayLike | None = None,
         scene_color: npt.ArrayLike | None = None,
     ) -> Frame:
-        """Return a still, finished in one call: no history, no noise to wait for.
+        """Return a still: a complete picture in one call, without history.
 
         Parameters
         ----------
         camera : Camera
         params : Params
         time : float
-            Seconds, of any size: where the wind has carried the clouds.
+            Time in seconds, of any magnitude. Winds carry the clouds from their positions at 0 s.
         background : {"sky", None}
-            ``"sky"``: the radiance of the whole sky, alpha 1. None: the clouds alone as seen
-            through the air, premultiplied, alpha = 1 - transmittance.
+            ``"sky"``: radiance of the whole sky, alpha 1. None: radiance of the clouds alone, seen
+            through the air and premultiplied, alpha = 1 - transmittance.
         scene_depth : array-like, shape (height, width), optional
-            A scene of yours among the clouds: metres along the ray of each pixel, not along the
-            axis of the camera (`distance_from_z`); inf, or any number above 1e10, where there is
-            nothing. Only what lies in front of it is seen. It hides the plain ground too, and casts
-            no shadow. Without `scene_color`, and with the sky, its pixels hold the clouds and the
-            air in front of it, premultiplied, with alpha below 1: ``frame + (1 - alpha) * yours``
-            is the picture, in which alpha has the luminance of the air's transmittance.
+            Depth of a user-supplied scene: distance in metres along the ray of each pixel, not
+            along the camera axis (`distance_from_z` converts). inf, or a value above 1e10, means
+            no surface. Only clouds and air in front of the scene are visible. The scene hides the
+            built-in ground and casts no shadow. Without `scene_color` and with the sky background,
+            a pixel of the scene holds the clouds and the air in front of it, premultiplied, with
+            alpha below 1: ``frame + (1 - alpha) * scene`` is the composite. Alpha includes the
+            luminance of the transmittance of the air.
         scene_color : array-like, shape (height, width, 3) or (height, width, 4), optional
-            Linear radiance of that scene, seen through air and clouds with each colour dimmed in
-            its own way. A fourth number is how much of the pixel the scene covers, 0 to 1, and the
-            radiance then premultiplied by it: the rest of the pixel sees what is behind. Needs the
-            sky as background.
+            Scene-linear radiance of that scene (Rec. 709 primaries). Clouds and air attenuate it by
+            colour channel. A fourth channel is the coverage of the pixel by the scene, 0 to 1, by
+            which the radiance is premultiplied; the rest of the pixel shows the background.
+            Requires the sky background.
 
         Returns
         -------
         frame : array of float32, shape (height, width, 4)
-            Scene-linear radiance with Rec. 709 primaries, never clipped; row 0 is the top.
+            Scene-linear radiance with Rec. 709 primaries, not clipped, and alpha; row 0 is the top.
 
         Raises
         ------
         ParameterError
-            Before any GPU work.
+            For an argument that is not allowed, before any GPU work.
         DeviceError
-            When the device is lost or out of memory.
+            If the device is lost or out of memory.
+
+        Examples
+        --------
+        >>> frame = nubis.Renderer(960, 540).render(*nubis.scenes["sunset"])
+        >>> frame.shape
+        (540, 960, 4)
         """
         _check_camera(camera)
         _check_params(params)
@@ -219,7 +255,7 @@ class Renderer:
         scene_depth: npt.ArrayLike | None,
         scene_color: npt.ArrayLike | None,
     ) -> Frame:
-        """What `make` makes of a scene that may cover pixels in part."""
+        """A picture by `make`, composited where a scene covers pixels partly."""
         scene = checked_scene(scene_depth, scene_color, self._size)
         if scene_color is not None and not sky:
             raise ParameterError('scene_color is not allowed with background=None: "sky" takes it')
@@ -227,7 +263,7 @@ class Renderer:
             return make(camera, params, time, sky, None, None)
         frame = make(camera, params, time, sky, scene.depth, scene.color)
         if scene.cover is not None:
-            # Of the pixels that are covered in part, what lies behind; the others end at the eye.
+            # The background of partly covered pixels. A depth of 0 skips all others.
             part = (scene.cover < 1) & np.isfinite(scene.depth)
             behind = np.where(part, np.float32(np.inf), np.float32(0))
             rest = self._core.render(camera, params, time, sky, behind, None)
@@ -243,27 +279,41 @@ class Renderer:
         time: float = 0.0,
         scene_depth: npt.ArrayLike | None = None,
     ) -> dict[str, npt.NDArray[Any]]:
-        """Return a still with all that is known of each pixel.
+        """Return the layers of a still.
 
         Parameters
         ----------
         camera, params, time, scene_depth
-            As for `render`. In front of a scene ``sky`` is the air alone, as before a black one.
+            As for `render`. In pixels of a scene, ``sky`` is the radiance of the air in front of
+            it, as for a black scene.
 
         Returns
         -------
         layers : dict of arrays
-            - ``radiance`` float32 (height, width, 3): the clouds seen through the air,
-              premultiplied; ``radiance + transmittance * sky`` is the picture.
-            - ``transmittance`` float32 (height, width): of all clouds, 0 to 1.
-            - ``depth`` float32 (height, width): metres to the clouds' mean scattering point,
-              inf where there are none.
-            - ``samples`` uint32 (height, width): density evaluations, primary and light together.
+            - ``radiance`` float32 (height, width, 3): radiance of the clouds, seen through the air
+              and premultiplied; ``radiance + transmittance * sky`` is the composite.
+            - ``transmittance`` float32 (height, width): transmittance of all clouds, 0 to 1.
+            - ``depth`` float32 (height, width): distance in metres to the mean scattering point of
+              the clouds, inf without clouds.
+            - ``samples`` uint32 (height, width): number of density evaluations, of view and light
+              samples together.
             - ``sky`` float32 (height, width, 3): radiance of the sky without clouds.
-            - ``standard_error`` float32 (height, width, 3), with light model ``"path"``: one
-              standard error of the clouds' radiance, before the air in front of them.
-            - ``change`` float32 (height, width, 3), with quality ``"reference"``: how much that
-              radiance changed when the steps were halved for the last time.
+            - ``standard_error`` float32 (height, width, 3), with light model ``"path"``: standard
+              error of the radiance of the clouds, without the air in front of them.
+            - ``change`` float32 (height, width, 3), with quality ``"reference"``: change of that
+              radiance by the last halving of the steps.
+
+        Raises
+        ------
+        ParameterError
+            For an argument that is not allowed, before any GPU work.
+        DeviceError
+            If the device is lost or out of memory.
+
+        Examples
+        --------
+        >>> layers = renderer.render_layers(camera, params)
+        >>> frame = layers["radiance"] + layers["transmittance"][..., None] * layers["sky"]
         """
         _check_camera(camera)
         _check_params(params)
@@ -291,34 +341,55 @@ class Renderer:
         background: Background = "sky",
         progress: Callable[[Iterable[Shot]], Iterable[Shot]] | None = None,
     ) -> Iterator[Frame]:
-        """Yield a frame for each shot, with temporal reprojection between consecutive ones.
+        """Yield a frame for each shot, with temporal reprojection between consecutive shots.
 
-        One pixel in sixteen is marched per frame, the others follow the clouds from the frame
-        before; the first frame and the first after a cut are stills. A static shot converges to
-        the still in which every pixel is marched (``contrast=0``). Where pixels are less than an
-        eighth of a degree wide, ``contrast=1``, as in ``"preview"``, marches one in sixty-four and
-        follows one in sixteen, between which frames are interpolated, as its stills are: a static
-        shot is the still. With light model ``"path"`` or
-        quality ``"reference"`` every frame is a still, and a static shot goes on tracing paths:
-        each frame has less noise.
+        A frame marches one pixel in sixteen. The other pixels are reprojected from the history, and
+        interpolated or marched where the history is rejected. The first frame and the first frame
+        after a cut are stills. A static shot converges to the still in which every pixel is marched
+        (``contrast=0``).
 
-        Where winds differ from those of the shot before, the sky does not jump to where it would
-        be had they always blown: it goes on from where it is, until the next cut, and the winds
-        change half way between the two shots. A still of such a shot is elsewhere; where stills
-        and frames have to agree, and for shots in any order, say where the sky is by `Keyframes`
-        or `Params.after`, which are shown as they are.
+        With ``contrast=1``, as in ``"preview"``, and pixels narrower than an eighth of a degree, a
+        frame marches one pixel in sixty-four and reprojects one in sixteen. Its frames are
+        upsampled from these pixels, as its stills are, so that a static shot equals the still.
+
+        With light model ``"path"`` or quality ``"reference"`` every frame is a still. A static shot
+        accumulates paths: noise decreases from frame to frame.
+
+        A change of wind between two shots does not make the clouds jump: the motion continues from
+        the frame before, until the next cut, and the winds change half-way between the two shots.
+        A still of the same shot shows the clouds elsewhere. Skies of `Keyframes` and `Params.after`
+        carry their own displacement and are rendered unchanged: use them if stills and frames have
+        to agree, or for shots in any order.
 
         Parameters
         ----------
         shots : iterable of (Camera, Params, time in seconds[, scene_depth[, scene_color]])
-            The scene as for `render`, another in each shot or None. Beside its edges, and where it
-            was nearer or farther in the frame before, every pixel is marched: nothing of the past
-            is kept that another scene has hidden or shown. What pixels covered in part see behind
-            it is a still's.
+            Camera, parameters and time of each frame, and a scene as for `render`, None or
+            different in each shot. At edges of the scene and at disocclusions, where its depth has
+            changed since the frame before, every pixel is marched and no history is kept. The
+            background of partly covered pixels is rendered as in a still.
         background : {"sky", None}
             As for `render`.
         progress : callable, optional
-            Wraps the shots, such as ``tqdm.tqdm``.
+            Wrapper of the iterable of shots, such as ``tqdm.tqdm``.
+
+        Yields
+        ------
+        frame : array of float32, shape (height, width, 4)
+            As returned by `render`.
+
+        Raises
+        ------
+        ParameterError
+            For an argument or a shot that is not allowed.
+        DeviceError
+            If the device is lost or out of memory.
+
+        Examples
+        --------
+        >>> shots = [(camera, params, i / 24) for i in range(48)]
+        >>> for i, frame in enumerate(renderer.animate(shots)):
+        ...     nubis.save(f"frame_{i:03}.png", frame)
         """
         sky = _sky(background)
         if not (progress is None or callable(progress)):
@@ -328,7 +399,7 @@ class Renderer:
         wrapped = progress(shots) if progress else shots
         try:
             each = iter(wrapped)
-        except Exception as error:  # whatever a class of its own raises
+        except Exception as error:  # a foreign class may raise anything
             raise ParameterError(
                 f"shots = {shots!r} is not allowed: it must be an iterable of shots ({error})"
             ) from error
@@ -340,7 +411,7 @@ class Renderer:
             try:
                 camera, params, time, *scene = shot
                 scene_depth, scene_color = [*scene, None, None][: max(2, len(scene))]
-            except Exception:  # whatever a class of its own raises
+            except Exception:  # a foreign class may raise anything
                 raise ParameterError(
                     f"shot = {shot!r} is not allowed: it must be (camera, params, time), or with "
                     "scene_depth, or with scene_depth and scene_color"
@@ -353,31 +424,44 @@ class Renderer:
 
     @property
     def history_length(self) -> npt.NDArray[np.uint32] | None:
-        """How much each pixel of the last frame of `animate` rests on, in frames.
+        """History length of each pixel of the last frame of `animate`, in frames.
 
-        Shape (height, width). 16 is a ray of its own, in this frame or in one since which it has
-        been followed; less is the mean of guesses from the rays around it in so many frames: what
-        has just come into the picture begins with 1. Where one pixel in sixteen is followed, it is
-        what the first of its sixteen rests on, 4 for each frame. None where nothing is
-        reprojected: before the first frame, without clouds, and with methods that converge or
-        trace paths.
+        Array of uint32, shape (height, width), or None. 16 means that the pixel has been sampled
+        directly: marched in this frame, or marched in an earlier one and reprojected since. Less is
+        the number of frames since the pixel was interpolated from the samples around it; 1 is an
+        interpolated pixel of this frame, such as a disoccluded one. If one pixel in sixteen is
+        reprojected (``contrast=1``), all sixteen pixels of a block have the value of the first,
+        which grows by 4 per frame. None if nothing is reprojected: before the first frame, without
+        clouds, with quality ``"reference"`` and with light model ``"path"``.
         """
         return self._core.history_length()
 
     def density(
         self, points: npt.ArrayLike, params: Params, *, time: float = 0.0
     ) -> npt.NDArray[np.float32]:
-        """Return the extinction at points: the field that `render` marches.
+        """Return the extinction of the clouds at points: the field that `render` marches.
 
         Parameters
         ----------
         points : array-like, shape (N, 3)
-            World metres.
+            Positions in world metres.
+        params : Params
+        time : float
+            Time in seconds.
 
         Returns
         -------
         extinction : array of float32, shape (N,)
-            In 1/m.
+            Extinction in 1/m.
+
+        Raises
+        ------
+        ParameterError
+            For an argument that is not allowed.
+
+        Examples
+        --------
+        >>> extinction = renderer.density([(0, 0, 1500), (0, 0, 2000)], params)
         """
         _check_params(params)
         return self._core.density(points, params, _time(time))
@@ -385,17 +469,29 @@ class Renderer:
     def sun_transmittance(
         self, points: npt.ArrayLike, params: Params, *, time: float = 0.0
     ) -> npt.NDArray[np.float32]:
-        """Return how much direct sun reaches points through the clouds.
+        """Return the transmittance of the clouds from points toward the sun.
 
         Parameters
         ----------
         points : array-like, shape (N, 3)
-            World metres.
+            Positions in world metres.
+        params : Params
+        time : float
+            Time in seconds.
 
         Returns
         -------
         transmittance : array of float32, shape (N,)
-            0 to 1; 0 where the ground hides the sun.
+            Transmittance, 0 to 1; 0 where the ground hides the sun.
+
+        Raises
+        ------
+        ParameterError
+            For an argument that is not allowed.
+
+        Examples
+        --------
+        >>> sunlit = renderer.sun_transmittance([(0, 0, 0), (500, 0, 0)], params)
         """
         _check_params(params)
         return self._core.sun_transmittance(points, params, _time(time))
@@ -410,34 +506,39 @@ class Renderer:
         size: int = 512,
         altitude: float = 0.0,
     ) -> ShadowMap:
-        """Return how much direct sun reaches a level square through all clouds.
+        """Return a map of the transmittance of all clouds toward the sun, on a horizontal square.
 
         Parameters
         ----------
         params : Params
         time : float
-            Seconds.
+            Time in seconds.
         center : (x, y)
-            Middle of the square in world metres.
+            Centre of the square in world metres.
         extent : float
-            Its side in metres, 1 to 1e7.
+            Side of the square in metres, 1 to 1e7.
         size : int
-            Texels along a side, 1 to 8192.
+            Number of texels along a side, 1 to 8192.
         altitude : float
             World z of the square in metres.
 
         Returns
         -------
         map : ShadowMap
-            ``transmittance`` float32 (size, size), row 0 in the north and column 0 in the west,
-            each texel the value at its centre: 0 to 1, 0 where the sun is below the horizon. It is
-            within 2 % (RMS) of `sun_transmittance`. ``world_from_map`` float64 (4, 4): see
+            ``transmittance`` float32 (size, size): 0 to 1 at the centres of the texels, row 0 in
+            the north, column 0 in the west; 0 if the sun is below the horizon. Its deviation from
+            `sun_transmittance` is within 2 % (RMS). ``world_from_map`` float64 (4, 4): see
             `ShadowMap`.
 
         Raises
         ------
         ParameterError
-            For a place, extent or size that is not allowed.
+            For a centre, extent or size that is not allowed.
+
+        Examples
+        --------
+        >>> shadow = renderer.shadow_map(params, extent=10_000.0, size=256)
+        >>> sunlit_fraction = shadow.transmittance.mean()
         """
         _check_params(params)
         x, y = numbers("center", center, "2 finite numbers", shapes=[(2,)])
@@ -455,27 +556,36 @@ class Renderer:
         time: float = 0.0,
         scene_depth: npt.ArrayLike | None = None,
     ) -> SunVisibility:
-        """Return how much of the sun a camera sees, wherever it looks: for lens flares and light.
+        """Return the visibility of the sun from the position of a camera, for flares and lighting.
 
-        Clouds take from the direct light and add to the ambient, as they scatter it to all sides
-        (gems2001).
+        Clouds attenuate the direct light and scatter part of it into ambient light (gems2001). The
+        view direction matters for `scene_depth` alone.
 
         Parameters
         ----------
         camera : Camera
         params : Params
         time : float
-            Seconds.
+            Time in seconds.
         scene_depth : array-like, shape (height, width), optional
-            As for `render`: where it is at most 1e10, it hides the sun.
+            Depth of a scene as for `render`. A depth of at most 1e10 hides the sun.
 
         Returns
         -------
         visibility : SunVisibility
-            ``direct``: the share of the sun's disc that is seen through clouds, over the ground and
-            beside the scene, as a mean over the disc and over a pixel's width around it; 0 with
-            the sun below the horizon. ``ambient``: the share of the sunlight that comes through the
-            clouds scattered, by two streams (`SunVisibility`).
+            ``direct``: transmittance toward the sun, 0 where ground or scene hide it, as a mean
+            over the disc and the width of a pixel around it; 0 if the sun is below the horizon.
+            ``ambient``: fraction of the sunlight that clouds transmit diffusely, by a two-stream
+            approximation (`SunVisibility`).
+
+        Raises
+        ------
+        ParameterError
+            For an argument that is not allowed.
+
+        Examples
+        --------
+        >>> direct, ambient = renderer.sun_visibility(camera, params)
         """
         _check_camera(camera)
         _check_params(params)
@@ -484,14 +594,18 @@ class Renderer:
         return seen_sun(self._core, camera, params, _time(time), depth, self._size)
 
     def weather_map(self, params: Params) -> npt.NDArray[np.float32]:
-        """Return the weather map as the march reads it: baked, your own, or a mixture.
+        """Return the weather map that the march reads: baked, user-supplied, or a mixture.
 
         Returns
         -------
         map : array of float32, shape (H, W, 3)
-            Coverage, type and precipitation, 0 to 1, row 0 in the north and column 0 in the west,
-            as `weather.map` takes them: to look at, to paint on (`paint`) or to save. They are
-            half floats on the GPU, exact to 5e-4.
+            Coverage, type and precipitation, 0 to 1, row 0 in the north, column 0 in the west: a
+            valid `weather.map`. Values are half floats on the GPU, exact to 5e-4.
+
+        Examples
+        --------
+        >>> weather = renderer.weather_map(params)
+        >>> coverage = weather[..., 0]
         """
         _check_params(params)
         return self._core.weather_map(params)
@@ -517,7 +631,7 @@ def _check_params(params: Any) -> None:
 def _size(name: str, value: Any) -> int:
     try:
         size = operator.index(value)
-    except Exception:  # whatever a class of its own raises
+    except Exception:  # a foreign class may raise anything
         size = 0
     if not 1 <= size <= 65536 or isinstance(value, bool):
         raise ParameterError(

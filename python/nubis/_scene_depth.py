@@ -1,4 +1,4 @@
-"""A user's scene among the clouds: what `scene_depth` and `scene_color` may be."""
+"""Validation of user-supplied scenes: `scene_depth` and `scene_color`."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from nubis._nubis import Camera
 
 Array = npt.NDArray[np.float32]
 
-# Farthest distance of a scene in m: beyond it is sky (crates/clouds_core/src/scene_depth.rs).
+# Largest distance of a scene in m; larger is sky (crates/clouds_core/src/scene_depth.rs).
 FARTHEST = np.float32(1e10)
 
 
 class Scene(NamedTuple):
-    """A checked scene: metres along each ray, radiance and cover where they are known."""
+    """A validated scene: distance in m along each ray, radiance and pixel coverage."""
 
     depth: Array
-    color: Array | None  # (H, W, 3), of what is there, not dimmed by its cover
-    cover: Array | None  # (H, W), None where all of it is 1
+    color: Array | None  # (H, W, 3), not premultiplied by the coverage
+    cover: Array | None  # (H, W), None if it is 1 everywhere
 
 
 def checked(depth: Any, color: Any, size: tuple[int, int]) -> Scene | None:
-    """The scene of a picture of `size` (width, height), None for none."""
+    """The validated scene for a picture of `size` (width, height), or None without a scene."""
     if depth is None:
         if color is not None:
             raise ParameterError("scene_color is not allowed without scene_depth")
@@ -46,7 +46,7 @@ def checked(depth: Any, color: Any, size: tuple[int, int]) -> Scene | None:
     cover = color[..., 3]
     if (cover > 1).any():
         raise first_bad("scene_color[..., 3]", cover, cover > 1, "from 0 to 1")
-    # What covers nothing is not there; what is, is as bright as it is however little it covers.
+    # A coverage of 0 means no surface. The radiance is divided by the coverage.
     depth = np.where(cover > 0, depth, np.float32(np.inf))
     whole = np.ascontiguousarray(color[..., :3] / np.where(cover > 0, cover, 1)[..., None])
     there = np.isfinite(depth)
@@ -75,26 +75,32 @@ def _numbers(name: str, value: Any, shapes: list[tuple[int | None, ...]], *, fin
 
 
 def distance_from_z(camera: Camera, z: npt.ArrayLike) -> Array:
-    """Return the distance along each pixel's ray for the z of a rasterizer.
+    """Return the distance along the ray of each pixel, from the z of a rasterizer.
 
-    A depth buffer, once made linear, holds z: metres along the axis of the camera. `scene_depth`
-    is metres along the ray, which in a corner of the picture is more.
+    A linearised depth buffer holds z, the distance along the camera axis. `scene_depth` is the
+    distance along the ray, which is larger away from the centre of the picture.
 
     Parameters
     ----------
     camera : Camera
-        A pinhole (`Camera.look_at`, `Camera.from_matrix`), of the picture that `z` has.
+        Pinhole camera of the depth buffer (`Camera.look_at`, `Camera.from_matrix`).
     z : array-like, shape (height, width)
-        Metres in front of the eye, inf where there is nothing.
+        Metres along the camera axis, inf for no surface.
 
     Returns
     -------
     distance : array of float32, shape (height, width)
+        Metres along the ray, inf for no surface.
 
     Raises
     ------
     ParameterError
-        For a camera without such a z, or an array that is not of two axes.
+        For a camera that is no pinhole, another shape, NaN or negative values.
+
+    Examples
+    --------
+    >>> depth = nubis.distance_from_z(camera, z)
+    >>> frame = renderer.render(camera, params, scene_depth=depth)
     """
     if not isinstance(camera, Camera) or camera.kind != "perspective":
         raise ParameterError(f"camera = {camera!r} is not allowed: it must be a pinhole camera")

@@ -1,4 +1,4 @@
-"""Skies to start from: name -> (camera, parameters)."""
+"""Example scenes: name -> (camera, parameters)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from nubis.params import Params
 def _look(
     eye: tuple[float, float, float], azimuth: float, pitch: float, fov_y: float = 60.0
 ) -> Camera:
-    """A camera that looks along a compass direction, `pitch` degrees above the horizon."""
+    """A camera that looks toward an azimuth, `pitch` degrees above the horizon."""
     from math import cos, radians, sin
 
     level = cos(radians(pitch))
@@ -43,7 +43,7 @@ def _make() -> dict[str, tuple[Camera, Params]]:
         ),
         "sunset": (
             _look((0, 0, 200), 250, 11),
-            # Before the sun clouds are as dark as they are deep: thesis2018's light glows through.
+            # Clouds in front of the sun are dark where they are thick; thesis2018 lets them glow.
             fair.with_(
                 **{
                     "sun.elevation": 3.0,
@@ -106,5 +106,5 @@ def _make() -> dict[str, tuple[Camera, Params]]:
     }
 
 
-#: Skies to start from: name -> (camera, parameters).
+#: Example scenes: name -> (camera, parameters).
 scenes: Mapping[str, tuple[Camera, Params]] = Named("scene", _make())

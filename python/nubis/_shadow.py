@@ -1,4 +1,4 @@
-"""Where the sun is seen: shadow maps and the sun in a camera."""
+"""Shadow maps, and the visibility of the sun from a camera."""
 
 from __future__ import annotations
 
@@ -14,28 +14,32 @@ from nubis.params import Params
 
 Vectors = npt.NDArray[np.float64]
 
-# The sun's angular radius, 0.2666 degrees (IAU: 695 700 km at 1 au).
+# Angular radius of the sun in radians: 0.2666 degrees (IAU: 695 700 km at 1 au).
 SUN_RADIUS = 0.004654
-# Points of the disc, each moved by a part of a pixel's width: a sharp edge across the disc is right
-# to 0.02.
+# Number of sample points on the disc, each jittered within the width of a pixel: the visible part
+# of a disc behind a sharp edge is exact to 0.02.
 DISC_POINTS = 256
-# How much of the light into a cloud of optical depth 1 turns back: 3/4 (1 - g) by two streams
-# without absorption, with g = 0.85 of droplets (Hansen 1971).
+# Two-stream reflection per unit of optical depth without absorption: 3/4 (1 - g), with g = 0.85 for
+# droplets (Hansen 1971).
 TURNED_BACK = 0.75 * (1 - 0.85)
 
 
 class ShadowMap(NamedTuple):
-    """Direct sun on a level square: see `Renderer.shadow_map`.
+    """Transmittance toward the sun on a horizontal square: see `Renderer.shadow_map`.
 
     Attributes
     ----------
     transmittance : array of float32, shape (size, size)
-        Through all clouds; row 0 is the north, column 0 the west.
+        Transmittance of all clouds; row 0 is in the north, column 0 in the west.
     world_from_map : array of float64, shape (4, 4)
-        Takes (column, row, height, 1) to world metres, with the centres of texels at
-        half-integers. The height is that over the square, along the rays of the sun: the inverse
-        takes a point to where its ray meets the square, so a point under the clouds has the light
-        of its column and row. With the sun at or below the horizon, heights are straight up.
+        Matrix from (column, row, height, 1) to world metres. Texel centres are at half-integers.
+        Height is in metres above the square, along the direction of the sun (vertical if the sun is
+        at or below the horizon). The inverse projects a world point along its sun ray onto the
+        square: a point under the clouds has the transmittance of its column and row.
+
+    Examples
+    --------
+    >>> column, row, height, _ = np.linalg.inv(shadow.world_from_map) @ (1000, 2000, 1500, 1)
     """
 
     transmittance: npt.NDArray[np.float32]
@@ -43,16 +47,16 @@ class ShadowMap(NamedTuple):
 
 
 class SunVisibility(NamedTuple):
-    """How much of the sun is seen: see `Renderer.sun_visibility`.
+    """Visibility of the sun: see `Renderer.sun_visibility`.
 
     Attributes
     ----------
     direct : float
-        Share of the sun's disc that is seen, 0 to 1: the mean of exp(-optical depth).
+        Direct transmittance, 0 to 1: the mean of exp(-optical depth) over the sun's disc.
     ambient : float
-        Share of the sunlight that arrives scattered by clouds, 0 to 1: the mean of what two streams
-        let through, 1 / (1 + 0.1125 optical depth), less the direct share. 0 under a clear sky,
-        0.5 under an optical depth of 9, and less again under a thicker cloud.
+        Diffuse transmittance, 0 to 1: the mean of the two-stream transmittance, 1 / (1 + 0.1125 x
+        optical depth), less `direct`. It is 0 under a clear sky, 0.5 at an optical depth of 9, and
+        decreases under thicker clouds.
     """
 
     direct: float
@@ -72,7 +76,7 @@ def sun_direction(params: Params) -> Vectors:
 def world_from_map(
     params: Params, center: tuple[float, float], altitude: float, extent: float, size: int
 ) -> Vectors:
-    """The matrix of a shadow map."""
+    """Matrix from (column, row, height, 1) of a shadow map to world metres."""
     texel = extent / size
     matrix = np.eye(4)
     matrix[:2, :2] = [[texel, 0], [0, -texel]]
@@ -84,13 +88,13 @@ def world_from_map(
 
 
 def disc(params: Params, pixel: float) -> Vectors:
-    """Directions spread evenly over the sun's disc, each moved within a pixel of that angle."""
+    """Unit vectors evenly over the sun's disc, each jittered within an angle of `pixel`."""
     sun = sun_direction(params)
     side = np.cross(sun, [0, 0, 1] if abs(sun[2]) < 0.9 else [1, 0, 0])
     side /= np.linalg.norm(side)
     over = np.cross(side, sun)
     i = np.arange(DISC_POINTS) + 0.5
-    # Vogel's spiral, and for the pixel a low-discrepancy sequence (R2).
+    # Vogel's spiral over the disc, the low-discrepancy sequence R2 within the pixel.
     angle, radius = i * math.pi * (3 - math.sqrt(5)), SUN_RADIUS * np.sqrt(i / DISC_POINTS)
     within = pixel * (np.outer(i, [0.7548776662, 0.5698402910]) % 1 - 0.5)
     x = radius * np.cos(angle) + within[:, 0]
@@ -101,7 +105,7 @@ def disc(params: Params, pixel: float) -> Vectors:
 
 
 def pixel_angle(camera: Camera, size: tuple[int, int]) -> float:
-    """Width of a pixel in the middle of the picture, radians."""
+    """Angular width in radians of a pixel in the centre of the picture."""
     width, height = size
     if camera.kind == "equirect":
         return 2 * math.pi / width
@@ -113,7 +117,7 @@ def pixel_angle(camera: Camera, size: tuple[int, int]) -> float:
 def pixels(
     camera: Camera, size: tuple[int, int], directions: Vectors
 ) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], npt.NDArray[np.bool_]]:
-    """Rows and columns that directions fall on, and whether they are in the picture."""
+    """Rows and columns of directions, and whether they are in the picture."""
     width, height = size
     axes = np.array([camera.right, camera.up, camera.forward])
     x, y, z = axes @ directions.T
@@ -146,8 +150,8 @@ def seen_sun(
     scene_depth: npt.NDArray[np.float32] | None,
     size: tuple[int, int],
 ) -> SunVisibility:
-    """The sun through the clouds, the mean over its disc."""
-    # The ground hides what is below the horizon of the disc alone, however wide pixels are.
+    """Visibility of the sun, averaged over its disc."""
+    # Unjittered points decide what the ground hides, independent of the width of a pixel.
     points, directions = disc(params, 0.0), disc(params, pixel_angle(camera, size))
     depths = core.depth_along(camera, np.concatenate([points, directions]), params, time)
     bare, moved = depths.astype(np.float64).reshape(2, -1)

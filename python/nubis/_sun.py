@@ -1,4 +1,4 @@
-"""Where the sun stands at a place and a time."""
+"""Position of the sun for a place and a time."""
 
 from __future__ import annotations
 
@@ -11,38 +11,43 @@ from nubis import _nubis
 from nubis._block import Block
 from nubis._errors import ParameterError
 
-# Terrestrial time minus universal time in s, now: it grows by less than 1 s a year, in which the
-# sun goes 1e-5 degrees.
+# Terrestrial time minus universal time in s, at present. It grows by less than 1 s a year, which
+# moves the sun by 1e-5 degrees.
 _DELTA_T = 69.0
 
 
 class SunBlock(Block):
-    """What `nubis.Sun` can do beside holding parameters."""
+    """Base class of `nubis.Sun`: constructors."""
 
     @classmethod
     def at(cls, latitude: float, longitude: float, time: datetime, **fields: Any) -> Self:
-        """Return the sun of a place and a time.
+        """Return the sun for a place and a time.
 
-        Its elevation is the geometric one, of the middle of the disc and without refraction, as
-        light goes straight in this renderer: near the horizon air lifts the sun that is seen by
-        half a degree, so that it rises and sets some minutes earlier and later than here. By the
-        Solar Position Algorithm (Reda and Andreas 2004), 0.0003 degrees from an almanac.
+        Elevation and azimuth come from the Solar Position Algorithm (Reda and Andreas 2004), which
+        is within 0.0003 degrees of an almanac. The elevation is geometric: of the centre of the
+        disc, without refraction, because light travels in straight lines in this renderer.
+        Refraction lifts the real sun by half a degree near the horizon, so that it rises some
+        minutes earlier and sets some minutes later.
 
         Parameters
         ----------
         latitude, longitude : float
             Degrees, north and east positive: -90 to 90 and -180 to 180.
         time : datetime
-            With a time zone, such as ``datetime(2026, 6, 21, 12, tzinfo=UTC)``.
+            Time with a time zone, such as ``datetime(2026, 6, 21, 12, tzinfo=UTC)``.
         **fields
-            The other fields of the sun, such as ``irradiance``.
+            Other fields of the sun, such as ``irradiance``.
+
+        Returns
+        -------
+        Sun
 
         Raises
         ------
         ParameterError
-            For a place that is none, and for a time without a zone.
+            For a latitude or longitude out of range, or a time without a time zone.
         ImportError
-            Where the library is missing: ``pip install "nubis[sun]"`` brings it.
+            Without the package sunposition: ``pip install "nubis[sun]"`` installs it.
 
         Examples
         --------
@@ -70,7 +75,7 @@ class SunBlock(Block):
                 'nubis.Sun.at needs the package sunposition: pip install "nubis[sun]"'
             ) from error
         universal = np.datetime64(time.astimezone(UTC).replace(tzinfo=None), "us")
-        # Without pressure it does not refract.
+        # A pressure of 0 switches refraction off.
         azimuth, zenith = observed_sunposition(
             universal, *place, 0.0, pressure=0.0, delta_t=_DELTA_T, jit=False
         )

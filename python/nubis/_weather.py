@@ -1,4 +1,4 @@
-"""Weathers that turn into one another."""
+"""Transitions between weathers."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ Mixture = tuple[tuple[Weather, float], ...]
 
 
 def mixture(layers: Iterable[tuple[Weather, float]]) -> tuple[Weather, Mixture]:
-    """The ``weather`` and ``weather_mix`` of weathers whose weights are 1 together.
+    """The ``weather`` and ``weather_mix`` of weighted weathers; weights sum to 1.
 
-    Equal ones are one, and those without weight are left out.
+    Equal weathers are merged, and weathers of weight 0 are omitted.
     """
     weights: dict[Weather, float] = {}
     for weather, weight in layers:
@@ -27,22 +27,22 @@ def mixture(layers: Iterable[tuple[Weather, float]]) -> tuple[Weather, Mixture]:
 
 
 def layers(params: Params) -> list[tuple[Weather, float]]:
-    """What the map of a sky is mixed from, with weights that are 1 together."""
+    """Weathers of a sky and their weights, which sum to 1."""
     rest = 1 - sum(weight for _, weight in params.weather_mix)
     return [(params.weather, max(rest, 0.0)), *params.weather_mix]
 
 
 class WeatherChange(NamedTuple):
-    """A change of a `WeatherBlend`.
+    """A transition of a `WeatherBlend`.
 
     Attributes
     ----------
     weather : Weather
-        What the sky turns to.
+        Weather at the end of the transition.
     at : float
-        Time at which it begins, in seconds.
+        Start of the transition in seconds.
     seconds : float
-        How long it takes; 0 is at once.
+        Duration of the transition in seconds; 0 switches at once.
     """
 
     weather: Weather
@@ -52,9 +52,9 @@ class WeatherChange(NamedTuple):
 
 @dataclass(frozen=True)
 class WeatherBlend:
-    """A weather that changes: every new one blends in linearly, over 30 s as in thesis2018.
+    """A weather with transitions: each new weather is blended in linearly, over 30 s (thesis2018).
 
-    A change that begins while another runs lies over it, so that the sky never jumps.
+    A transition that starts during another one is blended over it, so that the sky is continuous.
 
         blend = nubis.WeatherBlend(params.weather).change(nubis.Weather(seed=8), at=10.0)
         frame = renderer.render(camera, blend.apply(params, 25.0), time=25.0)
@@ -62,15 +62,15 @@ class WeatherBlend:
     Parameters
     ----------
     weather : Weather
-        What the sky is like before the first change.
+        Weather before the first transition.
     changes : sequence of WeatherChange
-        In any order: one that begins later lies over those before.
+        Transitions, in any order. They are blended in the order of their start.
 
     Raises
     ------
     ParameterError
-        For weathers that do not all have the same `extent`, `edge` and `broad_extent`, and for
-        times that are not finite or take less than 0 s.
+        For weathers of different `extent`, `edge` or `broad_extent`, a start that is not finite, or
+        a negative duration.
     """
 
     weather: Weather
@@ -101,11 +101,11 @@ class WeatherBlend:
         object.__setattr__(self, "changes", tuple(sorted(checked, key=lambda change: change.at)))
 
     def change(self, weather: Weather, at: float, seconds: float = 30.0) -> WeatherBlend:
-        """Return a blend that also turns to `weather`, from time `at` on, over `seconds`."""
+        """Return a blend with a further transition to `weather`: from `at` on, over `seconds`."""
         return WeatherBlend(self.weather, (*self.changes, WeatherChange(weather, at, seconds)))
 
     def at(self, time: float) -> tuple[Weather, Mixture]:
-        """Return what `Params` needs at a time: ``weather`` and ``weather_mix``."""
+        """Return the fields ``weather`` and ``weather_mix`` of `Params` at a time in seconds."""
         time = _finite("time", time)
         layers = [(self.weather, 1.0)]
         for weather, begins, seconds in self.changes:
@@ -117,7 +117,7 @@ class WeatherBlend:
         return mixture(layers)
 
     def apply(self, params: Params, time: float) -> Params:
-        """Return the parameters with the weather of a time."""
+        """Return the parameters with the weather of a time in seconds."""
         if not isinstance(params, Params):
             raise ParameterError(f"params = {params!r} is not allowed: it must be a nubis.Params")
         weather, mix = self.at(time)

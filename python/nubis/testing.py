@@ -1,4 +1,4 @@
-"""Looking inside: the value of single shader functions."""
+"""Evaluation of single shader functions, for tests."""
 
 from __future__ import annotations
 
@@ -27,17 +27,27 @@ def probe(
     Parameters
     ----------
     expression : str
-        A scalar or a vec4f, such as ``"henyey_greenstein(x.x, x.y)"``.
+        Expression of type scalar or vec4f, such as ``"henyey_greenstein(x.x, x.y)"``.
     inputs : array-like, shape (N,) or (N, k), k up to 4
-        Missing components of ``x`` are 0.
+        Values of ``x``; missing components are 0.
     imports : sequence of str
-        Files of ``shaders/wgsl`` without the ending, such as ``"phase"``.
+        Files of ``shaders/wgsl`` without their extension, such as ``"phase"``.
+    params : Params, optional
+        Parameters of the uniform blocks; the defaults if left out.
     eye : three floats
-        Where the eye is that the shaders count positions from, in metres.
+        Camera position in world metres, the origin of positions in the shaders.
+    time : float
+        Time in seconds.
+    quality : str or Quality
+        Numerical method of the uniform blocks.
 
     Returns
     -------
     values : array of float32, shape (N, 4)
+
+    Examples
+    --------
+    >>> values = probe("henyey_greenstein(x.x, x.y)", [(0.0, 0.6)], imports=["phase"])
     """
     given = numbers(
         "inputs",

@@ -12,7 +12,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 import nubis
-import twin
+import ref64
 from nubis import Camera, ParameterError, Params, Quality
 from test_params import CLASSES, IMAGES, allowed, filled, kind
 
@@ -177,7 +177,7 @@ def eyes(draw, sky, arcs=(0.0, 0.0, 1.0, 1e4, 3e5, 1e7), highest=1e8):
     altitude = min(altitude, highest)
     radius = sky.atmosphere.planet_radius
     angle = draw(st.sampled_from(arcs)) / radius
-    heading = twin.compass(draw(st.sampled_from([0.0, 45.0, 200.0])))
+    heading = ref64.compass(draw(st.sampled_from([0.0, 45.0, 200.0])))
     zenith = math.sin(angle) * heading + np.array([0, 0, math.cos(angle)])
     # The distance to sea level under the origin, without the difference of two large numbers.
     eye = zenith * altitude + radius * (zenith - [0, 0, 1])
@@ -191,7 +191,7 @@ def directions(draw, sky, eye):
     up = np.add(eye, [0, 0, radius])
     distance = np.linalg.norm(up)
     up = up / distance if distance > 0 else np.array([0.0, 0, 1])
-    sun = twin.sun_direction(sky)
+    sun = ref64.sun_direction(sky)
     across = np.add(np.cross(sun, [0, 0, 1]), [1e-9, 0, 0])
     special = [sun, -sun, across, np.cross(sun, across), up, -up]
     dips = [-math.acos(min((radius + h) / distance, 1)) for h in shells(sky) if distance > 0]
@@ -201,13 +201,13 @@ def directions(draw, sky, eye):
 
     @st.composite
     def slanted(draw):
-        heading = twin.compass(draw(st.floats(0, 360)))
+        heading = ref64.compass(draw(st.floats(0, 360)))
         level = heading - heading @ up * up
-        level = twin.normalized(level) if np.linalg.norm(level) > 1e-3 else np.cross(up, [0, 1, 0])
+        level = ref64.normalized(level) if np.linalg.norm(level) > 1e-3 else np.cross(up, [0, 1, 0])
         e = draw(elevation)
         return math.cos(e) * level + math.sin(e) * up
 
-    return twin.normalized(draw(st.one_of(st.sampled_from(special), slanted(), slanted())))
+    return ref64.normalized(draw(st.one_of(st.sampled_from(special), slanted(), slanted())))
 
 
 def look(eye, direction, fov=60.0, up=None):

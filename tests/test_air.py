@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-import air_twin
+import ref64_air
 import nubis
 from nubis import DensityGrid
 from nubis.testing import probe
@@ -32,10 +32,10 @@ def sky(renderer, params, direction, height=2.0):
 
 def test_radiance_of_the_air(renderer):
     """Every case that was traced, all orders: within 5 %, what the paths are unsure of aside."""
-    cases = json.loads(air_twin.FILE.read_text())
+    cases = json.loads(ref64_air.FILE.read_text())
     got, expected, unsure = [], [], []
     for case in cases:
-        direction = air_twin.direction_of(case["view"], case["azimuth"])
+        direction = ref64_air.direction_of(case["view"], case["azimuth"])
         params = clear(**{"sun.elevation": case["sun"], "sun.azimuth": 0.0})
         got.append(sky(renderer, params, direction, case["eye"]))
         expected.append(case["radiance"])
@@ -51,18 +51,18 @@ def test_radiance_of_the_air(renderer):
 
 
 def test_the_traced_file_is_of_this_twin():
-    case = next(c for c in json.loads(air_twin.FILE.read_text()) if c["sun"] == 20.0)
-    direction = air_twin.direction_of(case["view"], case["azimuth"])
-    sun = air_twin.direction_of(case["sun"], 0.0)
+    case = next(c for c in json.loads(ref64_air.FILE.read_text()) if c["sun"] == 20.0)
+    direction = ref64_air.direction_of(case["view"], case["azimuth"])
+    sun = ref64_air.direction_of(case["sun"], 0.0)
     rng = np.random.default_rng(5)
-    mean, error = air_twin.Air(1).trace(rng, case["eye"], direction, sun, 500)
+    mean, error = ref64_air.Air(1).trace(rng, case["eye"], direction, sun, 500)
     assert abs(mean - case["radiance"][1]) < 4 * (error + case["error"][1])
 
 
 def test_transmittance_to_space():
     """By quadrature, from the ground to the top and down to the horizon: within 1 %."""
     h = np.array([0.0, 100.0, 2000.0, 12_000.0, 40_000.0])
-    dip = np.degrees(np.arccos(air_twin.EARTH / (air_twin.EARTH + h)))
+    dip = np.degrees(np.arccos(ref64_air.EARTH / (ref64_air.EARTH + h)))
     above = np.array([0.05, 0.5, 2, 10, 45, 90])
     h, elevation = np.repeat(h, 6), (above - np.minimum(dip, 89)[:, None] * (above < 45)).ravel()
     mu = np.sin(np.radians(elevation))
@@ -70,12 +70,12 @@ def test_transmittance_to_space():
         "vec4f(air_transmittance(x.x, x.y), 1.0)", np.stack([h, mu], 1), imports=["atmosphere"]
     )
     for channel in range(3):
-        air = air_twin.Air(channel)
-        r = air_twin.EARTH + h[:, None]
-        top = (air_twin.EARTH + air_twin.TOP) ** 2
+        air = ref64_air.Air(channel)
+        r = ref64_air.EARTH + h[:, None]
+        top = (ref64_air.EARTH + ref64_air.TOP) ** 2
         end = -r * mu[:, None] + np.sqrt(r * r * mu[:, None] ** 2 + top - r * r)
         s = end * np.linspace(0, 1, 40_001)
-        at = np.sqrt(r * r + s * s + 2 * r * s * mu[:, None]) - air_twin.EARTH
+        at = np.sqrt(r * r + s * s + 2 * r * s * mu[:, None]) - ref64_air.EARTH
         expected = np.exp(-np.trapezoid(air.parts(at)[2], s, axis=1))
         np.testing.assert_allclose(got[:, channel], expected, rtol=0.01, atol=2e-4)
 
@@ -84,7 +84,7 @@ def test_a_clear_sky_is_shaped_as_cie_says(renderer):
     """CIE standard clear sky (type 12, of low turbidity: ten times our clearest aerosol): its
     luminance by angle from sun and zenith, to a factor of 1.9, where it spans one of seven.
     """
-    sun = air_twin.direction_of(45.0, 0.0)
+    sun = ref64_air.direction_of(45.0, 0.0)
     params = clear(**{"sun.elevation": 45.0, "sun.azimuth": 0.0, "atmosphere.haze": 10.0})
     a, b, c, d, e = -1.0, -0.32, 10.0, -3.0, 0.45
 
@@ -99,7 +99,7 @@ def test_a_clear_sky_is_shaped_as_cie_says(renderer):
     ours, cie = [], []
     for elevation in (10, 25, 40, 60, 75):
         for azimuth in (15, 60, 90, 135, 180):
-            direction = air_twin.direction_of(elevation, azimuth)
+            direction = ref64_air.direction_of(elevation, azimuth)
             ours.append(sky(renderer, params, direction) @ LUMINANCE)
             cie.append(relative(direction) / relative(zenith))
     ratio = np.array(ours) / (sky(renderer, params, zenith) @ LUMINANCE) / np.array(cie)
@@ -149,8 +149,8 @@ def test_night_falls(renderer):
 def test_tables_are_made_when_their_inputs_change():
     make = nubis.Renderer(16, 9)
     camera = looking((0.0, 1.0, 0.2), fov=60.0)
-    bakes = {"transmittance_bake", "first_order", "sum_orders", "sky_map_bake", "air_share_bake"}
-    air = bakes - {"sky_map_bake", "air_share_bake"}
+    bakes = {"transmittance_bake", "first_order", "sum_orders", "sky_view_bake", "aerial_perspective_bake"}
+    air = bakes - {"sky_view_bake", "aerial_perspective_bake"}
 
     def baked(**changes):
         make.render(camera, clear(**changes))
@@ -162,7 +162,7 @@ def test_tables_are_made_when_their_inputs_change():
     assert baked(**{"light.g": 0.3}) == set()
     assert baked(**{"sun.elevation": 20.0}) == bakes - air
     # Its scattered light may be kept on disk.
-    assert baked(**{"atmosphere.haze": 2.125}) >= {"transmittance_bake", "sky_map_bake"}
+    assert baked(**{"atmosphere.haze": 2.125}) >= {"transmittance_bake", "sky_view_bake"}
     assert baked(**{"atmosphere.haze": 2.125}) == set()
 
 
@@ -278,12 +278,12 @@ def test_the_air_before_a_cloud(place):
     assert seen["transmittance"][0, 0] < 0.01
     distance = float(seen["depth"][0, 0])
     own = (seen["radiance"] - dark["radiance"])[0, 0] / bare
-    sun = air_twin.direction_of(45.0, 180.0)
+    sun = ref64_air.direction_of(45.0, 180.0)
     rng = np.random.default_rng(4)
     for channel in range(3):
-        air = air_twin.Air(channel)
+        air = ref64_air.Air(channel)
         s = np.linspace(0, distance, 4001)
-        h = np.sqrt((air_twin.EARTH + 2000) ** 2 + s * s) - air_twin.EARTH
+        h = np.sqrt((ref64_air.EARTH + 2000) ** 2 + s * s) - ref64_air.EARTH
         through = np.exp(-np.trapezoid(air.parts(h)[2], s))
         assert own[channel] == pytest.approx(through, rel=0.03)
         light, unsure = air.trace(rng, 2000.0, direction, sun, 1500, limit=distance)
@@ -326,7 +326,7 @@ def test_the_sun_sets_later_above():
     assert low[0, 0, 3] > 0.9 and high[0, 0, 3] > 0.9
     assert (low[0, 0, :3] == 0).all()
     mu = np.sin(np.radians(-1.5))
-    light = [air_twin.Air(c).sunlight(np.array([8700.0]), np.array([mu]))[0] for c in range(3)]
+    light = [ref64_air.Air(c).sunlight(np.array([8700.0]), np.array([mu]))[0] for c in range(3)]
     ratio = high[0, 0, :3] / light
     np.testing.assert_allclose(ratio, ratio[0], rtol=0.1)
     assert light[0] > 3 * light[2] > 0
@@ -354,7 +354,7 @@ def test_methods_agree_in_air():
 def share(height, changes):
     params = nubis.Params().with_(**{"clouds.type": 0.5, "weather.type_variety": 0.0, **changes})
     base, top = params.clouds.base, params.clouds.top
-    column = "Column(1.0, 1.0, 1.0, x.x, 0.0, vec3f(0.0), CLOUD, x.y, x.x)"
+    column = "WeatherSample(1.0, 1.0, 1.0, x.x, 0.0, vec3f(0.0), CLOUD, x.y, x.x)"
     at = [[h, top - base] for h in np.atleast_1d(height)]
     return probe(f"ambient_share({column})", at, imports=["ambient"], params=params)[:, 0]
 

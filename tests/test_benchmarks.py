@@ -435,8 +435,8 @@ def test_memory():
     bigger = nubis.Renderer(192, 108)
     bigger.render(*FAIR)
     # A ray for each pixel and one more, until they are a degree apart.
-    assert scene.pop("beams") == 8 * 97 * 55 * 32
-    assert (again := held(bigger, "scene")).pop("beams") < 8 * 193 * 109 * 32
+    assert scene.pop("light_shafts") == 8 * 97 * 55 * 32
+    assert (again := held(bigger, "scene")).pop("light_shafts") < 8 * 193 * 109 * 32
     assert again == scene and held(bigger, "still")["sky"] == 4 * still["sky"]
     next(renderer.animate([(*FAIR, 0.0)]))
     assert held(renderer, "animation")["image"] == 16 * 96 * 54

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import nubis
-import twin
+import ref64
 from nubis import Camera, ParameterError
 
 
@@ -97,12 +97,12 @@ def test_look_at(renderer, eye, target, up):
     """The sun stands where a pinhole projects it, pixel by pixel."""
     size = 48, 32
     camera = Camera.look_at(eye, target, up, 50.0)
-    forward = twin.normalized(np.subtract(target, eye))
-    right = twin.normalized(np.cross(forward, up))
+    forward = ref64.normalized(np.subtract(target, eye))
+    right = ref64.normalized(np.cross(forward, up))
     np.testing.assert_allclose(camera.forward, forward, atol=1e-12)
     np.testing.assert_allclose(camera.right, right, atol=1e-12)
     np.testing.assert_allclose(camera.up, np.cross(right, forward), atol=1e-12)
-    directions = twin.pixel_directions(camera, *size)
+    directions = ref64.pixel_directions(camera, *size)
     for x, y in [(24, 16), (3, 2), (40, 5)]:
         d = directions[y, x]
         azimuth, elevation = np.degrees(np.arctan2(d[0], d[1])), np.degrees(np.arcsin(d[2]))
@@ -152,7 +152,7 @@ def test_projections_agree(renderer):
     equirect = renderer(n, n // 2, method).render(Camera.equirect(eye), params)
     for x, y in [(40, 10), (10, 6), (33, 14)]:
         azimuth, elevation = ((x + 0.5) / n - 0.5) * 360, 90 - (y + 0.5) / n * 360
-        target = eye + twin.compass(azimuth, elevation)
+        target = eye + ref64.compass(azimuth, elevation)
         pinhole = Camera.look_at(eye, target, fov_y=np.degrees(2 * np.arctan(0.5 * pixel)))
         fisheye = Camera.fisheye(eye, up=target - eye, fov=np.degrees(pixel))
         for camera in (pinhole, fisheye):

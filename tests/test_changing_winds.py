@@ -9,9 +9,9 @@ import re
 import numpy as np
 import pytest
 
-import noise_twin
+import ref64_noise
 import nubis
-import twin
+import ref64
 from nubis import Keyframes, ParameterError, Params, _nubis
 from test_wind import TILE, alike, moved, points_of, rms
 
@@ -46,7 +46,7 @@ gauss_nodes, gauss_weights = np.polynomial.legendre.leggauss(40)
 
 def value(params, path):
     block, _, name = path.partition(".")
-    return float(noise_twin.f32(getattr(getattr(params, block), name)))
+    return float(ref64_noise.f32(getattr(getattr(params, block), name)))
 
 
 def wander(params):
@@ -144,7 +144,7 @@ def test_gusts_are_carried_on_by_the_period_of_each_moment(easing):
     b = a.with_(**{"wander.wind": 0.2, "wander.period": 3000.0, "wind.speed": 30.0})
     keys = Keyframes([(1000.0, a), (9000.0, b)], easing)
     k = np.arange(4)
-    _, phase = noise_twin.turns(a.wander, 0)
+    _, phase = ref64_noise.turns(a.wander, 0)
     turn = (-1.0) ** k * 2 * np.pi * 3 ** (-(k - 1.5) / 4)
     for time in (1200.0, 3000.0, 4999.0, 5001.0, 8700.0):
         sky = keys.at(time)
@@ -196,9 +196,9 @@ def test_the_field_moves_by_the_integral(renderer, rng):
     points, altitude = points_of(rng, start, 4000, 15_000)
     for time in (0.5 * HOUR, 2.0 * HOUR, 5.0 * HOUR):
         if time < HOUR:
-            way = noise_twin.blown(start, 72.0, 5.0, time)
+            way = ref64_noise.blown(start, 72.0, 5.0, time)
         else:
-            way = noise_twin.blown(start, 72.0, 5.0, HOUR)
+            way = ref64_noise.blown(start, 72.0, 5.0, HOUR)
             way = way + numerical(keys, HOUR, min(time, 4 * HOUR), 16)[:2]
         if time > 4 * HOUR:
             way = way + HOUR * rates(keys.at(time))[:2]
@@ -310,8 +310,8 @@ def test_an_animation_of_keys_stays_near_the_still(renderer):
     steady = [(view(), keys.at(times[-1]), times[-1] + t - 20) for t in np.linspace(0, 20, 33)]
     *_, flown = make.animate(steady)
     expected = make.render(view(), keys.at(times[-1]), time=times[-1])
-    usual = twin.relative_rmse(flown[..., :3], expected[..., :3])
-    assert twin.relative_rmse(last[..., :3], still[..., :3]) < 1.3 * usual + 0.02
+    usual = ref64.relative_rmse(flown[..., :3], expected[..., :3])
+    assert ref64.relative_rmse(last[..., :3], still[..., :3]) < 1.3 * usual + 0.02
 
 
 def test_any_time_is_a_time_of_an_animation():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import nubis
-import twin
+import ref64
 from nubis.testing import probe
 
 RADIUS = 6_371_000.0
@@ -34,10 +34,10 @@ def visible(eye, rng, n):
     """World points of the clouds that an eye sees, and of those beyond its horizon that rise over
     it.
     """
-    height = twin.altitude(eye, RADIUS)
+    height = ref64.altitude(eye, RADIUS)
     most = math.acos(RADIUS / (RADIUS + max(height, 0))) + math.acos(RADIUS / (RADIUS + 10_000))
     cap = at_angle(most * np.sqrt(rng.uniform(0, 1, n)), rng.uniform(0, 2 * np.pi, n), 0)
-    return twin.raised(cap, RADIUS, rng.uniform(0, 10_000, n)), most
+    return ref64.raised(cap, RADIUS, rng.uniform(0, 10_000, n)), most
 
 
 @pytest.mark.slow_after(4)
@@ -48,9 +48,9 @@ def test_places_beside_the_eye(rng, name, away):
     distance, which is what single precision leaves of a point.
     """
     eye = np.array(EYES[name])
-    p = (away * twin.normalized(rng.normal(size=(300, 3)))).astype(np.float32)
+    p = (away * ref64.normalized(rng.normal(size=(300, 3)))).astype(np.float32)
     got = probe(PLACE, p, imports=IMPORTS, eye=tuple(eye))[:, :2]
-    here, there = (twin.on_chart(at, RADIUS) for at in (eye, eye + p.astype(np.float64)))
+    here, there = (ref64.on_chart(at, RADIUS) for at in (eye, eye + p.astype(np.float64)))
     np.testing.assert_allclose(got, there - here, atol=max(0.01, 5e-7 * away))
 
 
@@ -61,8 +61,8 @@ def test_no_direction_is_preferred_in_sight(rng, height):
     from 2000 km and 6.6 from 36 000 km.
     """
     points, most = visible((0.0, 0.0, height), rng, 400)
-    up = twin.normalized(twin.from_centre(points, RADIUS))
-    east = twin.normalized(np.cross([0.0, 1.0, 0.0], up))
+    up = ref64.normalized(ref64.from_centre(points, RADIUS))
+    east = ref64.normalized(np.cross([0.0, 1.0, 0.0], up))
     north = np.cross(up, east)
     steps = []
     for side in (east, north):

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import nubis
-import twin
-from noise_twin import gradients, height_profile
+import ref64
+from ref64_noise import gradients, height_profile
 from nubis.testing import probe
 
 
@@ -32,7 +32,7 @@ def density_by_height(renderer, rng, params, heights, n=3000, reach=20_000.0):
     points = np.zeros((len(heights), n, 3))
     points[..., :2] = rng.uniform(-reach, reach, (1, n, 2))
     raised = [
-        twin.raised(p, params.atmosphere.planet_radius, h)
+        ref64.raised(p, params.atmosphere.planet_radius, h)
         for p, h in zip(points, heights, strict=True)
     ]
     extinction = renderer().density(np.concatenate(raised), params)
@@ -144,7 +144,7 @@ def cloud_by_distance(renderer, rng, params, altitude, edges):
     radius = rng.uniform(0, edges[-1], n)
     angle = rng.uniform(0, 2 * math.pi, n)
     points = np.stack([radius * np.cos(angle), radius * np.sin(angle), 0 * radius], axis=-1)
-    points = twin.raised(points, params.atmosphere.planet_radius, altitude)
+    points = ref64.raised(points, params.atmosphere.planet_radius, altitude)
     cloudy = renderer().density(points, params) > 0
     ring = np.digitize(radius, edges)
     return np.array([cloudy[ring == i].mean() for i in range(len(edges))])
@@ -279,9 +279,9 @@ def test_the_upper_deck_has_its_own_wind(renderer, rng, time):
     upper = rng.uniform((-5000, -5000, 4900), (5000, 5000, 5500), (3000, 3))
     lower = rng.uniform((-5000, -5000, 1300), (5000, 5000, 3100), (3000, 3))
     radius = params.atmosphere.planet_radius
-    heights = twin.altitude(upper, radius)
-    places = twin.on_chart(upper, radius) + time * 12.0 * np.array([1.0, 0])
-    drifted = twin.from_chart(places, radius, heights)
+    heights = ref64.altitude(upper, radius)
+    places = ref64.on_chart(upper, radius) + time * 12.0 * np.array([1.0, 0])
+    drifted = ref64.from_chart(places, radius, heights)
     before, after = (
         renderer().density(upper, params),
         renderer().density(drifted, params, time=time),
@@ -316,7 +316,7 @@ def test_decks_in_pictures(renderer):
 
 
 def coverage_at(points, params):
-    expression = "vec4f(weather_texel(frame.sky.weather_origin, x.xy, broad_weather(x.xy)), 0.0)"
+    expression = "vec4f(weather_texel(frame.sky.weather_origin, x.xy, large_scale_weather(x.xy)), 0.0)"
     padded = np.hstack([points, np.zeros((len(points), 2))])
     return probe(expression, padded, imports=["density"], params=params)[:, 0].astype(np.float64)
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import nubis
-import twin
-from noise_twin import base_shape, eroded, gradients, height_profile, with_coverage
+import ref64
+from ref64_noise import base_shape, eroded, gradients, height_profile, with_coverage
 from nubis.testing import probe
 
 UNIT = np.linspace(0, 1, 11)
@@ -125,7 +125,7 @@ def points_in_shell(rng, params, n, reach):
     points = np.zeros((n, 3))
     points[:, :2] = rng.uniform(-reach, reach, (n, 2))
     heights = rng.uniform(params.clouds.base, params.clouds.top, n)
-    return twin.raised(points, params.atmosphere.planet_radius, heights), heights
+    return ref64.raised(points, params.atmosphere.planet_radius, heights), heights
 
 
 @pytest.mark.parametrize("time", [0.0, 7200.0])
@@ -137,8 +137,8 @@ def test_density_is_the_published_sampler(renderer, rng, time):
     c, w = params.clouds, params.wind
     points, altitude = points_in_shell(rng, params, 4000, 30_000)
     height = (altitude - c.base) / (c.top - c.base)
-    downwind = twin.compass(w.direction)[:2]
-    places = twin.on_chart(points, params.atmosphere.planet_radius)
+    downwind = ref64.compass(w.direction)[:2]
+    places = ref64.on_chart(points, params.atmosphere.planet_radius)
     at = places - (height * w.shear)[:, None] * downwind
 
     def moved(xy, speed):
@@ -206,12 +206,12 @@ def test_nothing_outside_the_shell(renderer, rng):
     level = np.zeros((2000, 3))
     level[:, :2] = rng.uniform(-150_000, 150_000, (2000, 2))
     outside = [
-        twin.raised(level, radius, h) for h in (0, 0.5 * base, base - 0.5, top + 0.5, top + 5000)
+        ref64.raised(level, radius, h) for h in (0, 0.5 * base, base - 0.5, top + 0.5, top + 5000)
     ]
     for points in outside:
         # The first point is the origin of the others: put it in their midst.
         assert (renderer().density(np.vstack([[0, 0, base], points]), params) == 0).all()
-    inside = twin.raised(level, radius, base + 0.3 * (top - base))
+    inside = ref64.raised(level, radius, base + 0.3 * (top - base))
     near, far = (np.hypot(*level[:, :2].T) < 75_000), (np.hypot(*level[:, :2].T) > 150_000)
     cloudy = renderer().density(inside, params) > 0
     assert cloudy[near].mean() > 0.1
@@ -266,8 +266,8 @@ def test_wind_carries_the_field(renderer, rng, time, speed):
     params = wind_params(direction, speed)
     radius = params.atmosphere.planet_radius
     points, heights = points_in_shell(rng, params, 2000, 10_000)
-    places = twin.on_chart(points, radius) + time * speed * twin.compass(direction)[:2]
-    carried = twin.from_chart(places, radius, heights)
+    places = ref64.on_chart(points, radius) + time * speed * ref64.compass(direction)[:2]
+    carried = ref64.from_chart(places, radius, heights)
     before = renderer().density(points, params)
     after = renderer().density(carried, params, time=time)
     assert (before > 0).mean() > 0.05

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import nubis
-import twin
+import ref64
 
 RADIUS = nubis.Params().atmosphere.planet_radius
 CUMULUS = nubis.Params().with_(**{"clouds.coverage": 0.5, "high_clouds.coverage": 0.0})
@@ -58,17 +58,17 @@ def test_overcast_reaches_the_limb(renderer, height, quality):
 @pytest.mark.parametrize("height", [3e4, 4.02e5, 2e6])
 def test_transmittance_from_afar(renderer, height):
     """Rays straight down and slanting, in float64, through a field that steps resolve."""
-    params = twin.smooth_params(**{"clouds.extinction": 5e-4})
+    params = ref64.smooth_params(**{"clouds.extinction": 5e-4})
     angles = np.radians([0.0, 3.0, 10.0])
     for angle in angles:
         direction = np.array([0.0, math.sin(angle), -math.cos(angle)])
         eye = np.array([2000.0, 1000.0, height])
         camera = nubis.Camera.look_at(eye, eye + direction, (0, 1, 0.1), fov_y=1e-4)
-        got = renderer(1, 1, twin.fine(256)).render_layers(camera, params)["transmittance"][0, 0]
-        near = twin.sphere_hits(eye, direction, RADIUS, params.clouds.top)[0]
+        got = renderer(1, 1, ref64.fine(256)).render_layers(camera, params)["transmittance"][0, 0]
+        near = ref64.sphere_hits(eye, direction, RADIUS, params.clouds.top)[0]
         start = (eye + near * direction)[None]
-        ends = twin.sphere_hits(start[0], direction, RADIUS, params.clouds.base)[0].reshape(1)
-        depth, _ = twin.optical_depths(renderer(), params, start, direction[None], ends, 2000)
+        ends = ref64.sphere_hits(start[0], direction, RADIUS, params.clouds.base)[0].reshape(1)
+        depth, _ = ref64.optical_depths(renderer(), params, start, direction[None], ends, 2000)
         np.testing.assert_allclose(got, np.exp(-depth.sum()), atol=5e-3)
 
 

@@ -6,9 +6,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-import noise_twin
+import ref64_noise
 import nubis
-import twin
+import ref64
 from test_twins import texels
 
 ALONE = {"clouds.coverage": 0.0, "sun.visible": False, "atmosphere.enabled": False}
@@ -47,12 +47,12 @@ def layer_hits(camera, size, params):
     """Where the rays of a view meet the layer, shape (h, w, 3), and the cosines of the rays and of
     the sun with the zenith there.
     """
-    directions = twin.pixel_directions(camera, *size)
+    directions = ref64.pixel_directions(camera, *size)
     radius, altitude = params.atmosphere.planet_radius, params.high_clouds.altitude
-    near, far = twin.sphere_hits(camera.eye, directions, radius, altitude)
+    near, far = ref64.sphere_hits(camera.eye, directions, radius, altitude)
     at = camera.eye + np.where(near > 0, near, far)[..., None] * directions
-    up = twin.normalized(twin.from_centre(at, radius))
-    return at, (up * directions).sum(axis=-1), up @ twin.sun_direction(params)
+    up = ref64.normalized(ref64.from_centre(at, radius))
+    return at, (up * directions).sum(axis=-1), up @ ref64.sun_direction(params)
 
 
 # --- Patterns ---------------------------------------------------------------------------------
@@ -201,8 +201,8 @@ def test_the_whole_layer_follows_its_formulas(renderer, rng, curve, kind):
     points = rng.uniform(-30_000, 30_000, (300, 2))
     got = thickness(renderer, points, params, time=1234.0)
     radius, height = params.atmosphere.planet_radius, params.high_clouds.altitude
-    layer = twin.raised(np.column_stack([points, np.zeros(300)]), radius, height)
-    expected = noise_twin.high_clouds(twin.on_chart(layer, radius), params, 1234.0)[0]
+    layer = ref64.raised(np.column_stack([points, np.zeros(300)]), radius, height)
+    expected = ref64_noise.high_clouds(ref64.on_chart(layer, radius), params, 1234.0)[0]
     assert expected.std() > 0.1
     # A texel is wrong by up to 2^-11, which the steeper curve multiplies by 2.5.
     np.testing.assert_allclose(got, expected, atol=2e-3)
@@ -258,9 +258,9 @@ def test_high_clouds_shade(renderer, rng):
         points = np.vstack([[0, 0, 0.1], points])
         return -np.log(renderer().sun_transmittance(points, params.with_(**changes)))[1:]
 
-    slanted, sun = shade(points), twin.sun_direction(params)
-    meets = points + twin.sphere_hits(points, sun, radius, altitude)[1][:, None] * sun
-    sine = twin.normalized(twin.from_centre(meets, radius)) @ sun
+    slanted, sun = shade(points), ref64.sun_direction(params)
+    meets = points + ref64.sphere_hits(points, sun, radius, altitude)[1][:, None] * sun
+    sine = ref64.normalized(ref64.from_centre(meets, radius)) @ sun
     straight = shade(meets * [1, 1, 0] + [0, 0, 10], **{"sun.elevation": 90.0})
     assert 0.05 < straight.max() <= 0.8
     np.testing.assert_allclose(slanted * sine, straight, rtol=1e-2, atol=1e-3)
@@ -316,8 +316,8 @@ def test_single_scattering_in_the_layer(renderer, elevation, down):
     t = along[..., None] * share
     crossed = toward[..., None] * (share if down else 1 - share)
     integral = (np.exp(-t - crossed) * along[..., None] / 2000).sum(axis=-1)
-    directions = twin.pixel_directions(camera, *SIZE)
-    mu, g = directions @ twin.sun_direction(params), params.light.g
+    directions = ref64.pixel_directions(camera, *SIZE)
+    mu, g = directions @ ref64.sun_direction(params), params.light.g
     phase = (1 - g * g) / (4 * np.pi * (1 + g * g - 2 * g * mu) ** 1.5)
     expected = params.light.albedo * phase * integral * params.sun.irradiance[0]
     assert along.max() > 2 and expected.std() > 0.02 * expected.mean()
@@ -356,7 +356,7 @@ def direct_light(renderer, elevation, azimuth=0.0, pitch=80.0, **others):
         {"coverage": 1.0, "optical_depth": 3.0, "altitude": 6000.0},
         **{"sun.elevation": elevation, "sun.azimuth": 0.0, "light.model": "single"} | others,
     )
-    eye, ahead = np.array([0, 0, 10.0]), twin.compass(azimuth, pitch)
+    eye, ahead = np.array([0, 0, 10.0]), ref64.compass(azimuth, pitch)
     camera = nubis.Camera.look_at(tuple(eye), tuple(eye + 1000 * ahead), (0, 0, 1), 5.0)
     return renderer(*SIZE).render_layers(camera, params)["radiance"].mean(axis=(0, 1))
 
@@ -411,8 +411,8 @@ def test_emboss(renderer, down, kind):
     )
     np.testing.assert_array_equal(plain["transmittance"], embossed["transmittance"])
     at, *_ = layer_hits(camera, SIZE, params)
-    places = twin.on_chart(at.reshape(-1, 3), params.atmosphere.planet_radius)
-    thick, relief = noise_twin.high_clouds(places, params, 0.0)
+    places = ref64.on_chart(at.reshape(-1, 3), params.atmosphere.planet_radius)
+    thick, relief = ref64_noise.high_clouds(places, params, 0.0)
     expected = 1 + 0.6 * 0.9 * relief / (np.abs(relief) + 0.15)
     seen = thick > 0.02
     ratio = (embossed["radiance"] / np.maximum(plain["radiance"], 1e-9))[..., 0].ravel()
@@ -453,7 +453,7 @@ def test_the_last_light_is_embossed(renderer):
         values = {"coverage": 0.6, "optical_depth": 3.0, "emboss": emboss}
         sun = {"sun.elevation": elevation, "sun.azimuth": 0.0, "light.model": "single"}
         eye = np.array([0, 0, 12_000.0])
-        ahead = tuple(eye + 1000 * twin.compass(0.0, -3.2))
+        ahead = tuple(eye + 1000 * ref64.compass(0.0, -3.2))
         camera = nubis.Camera.look_at(tuple(eye), ahead, fov_y=1.0)
         return renderer(*SIZE).render(camera, high_params(values, **sun))[..., 0]
 
@@ -482,7 +482,7 @@ def test_order(renderer, altitude, height, pitch):
     eye = np.array([0, 0, height])
     # From between the two rays meet both where they pass just over the ground.
     pitch, fov = (-1.9, 1.0) if 3200 < height < altitude else (pitch, 30.0)
-    ahead = eye + 1000 * twin.compass(20, pitch)
+    ahead = eye + 1000 * ref64.compass(20, pitch)
     camera = nubis.Camera.look_at(tuple(eye), tuple(ahead), fov_y=fov)
     make = renderer(*SIZE)
     both, clouds, layer = (
@@ -522,15 +522,15 @@ def test_no_seam_at_the_horizon_of_the_layer(renderer, height):
     limb = params.high_clouds.altitude if height > params.high_clouds.altitude else 0.0
     dip = np.degrees(np.arccos((radius + limb) / (radius + height)))
     eye = np.array([0, 0, height])
-    ahead = eye + 1000 * twin.compass(0, -dip)
+    ahead = eye + 1000 * ref64.compass(0, -dip)
     camera = nubis.Camera.look_at(tuple(eye), tuple(ahead), fov_y=4.0)
     through = renderer(4, 120).render_layers(camera, params)["transmittance"]
-    seen = twin.sphere_hits(
-        camera.eye, twin.pixel_directions(camera, 4, 120), radius, params.high_clouds.altitude
+    seen = ref64.sphere_hits(
+        camera.eye, ref64.pixel_directions(camera, 4, 120), radius, params.high_clouds.altitude
     )
     covered = np.isfinite(seen[1]) & (seen[1] > 0)
     if limb == 0.0:
-        ground = twin.sphere_hits(camera.eye, twin.pixel_directions(camera, 4, 120), radius, 0.0)
+        ground = ref64.sphere_hits(camera.eye, ref64.pixel_directions(camera, 4, 120), radius, 0.0)
         covered &= ~(ground[0] > 0)
     assert 40 < covered[:, 0].sum() < 80
     assert (through[covered] < 1e-3).all() and (through[~covered] == 1).all()

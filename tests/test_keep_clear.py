@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-import noise_twin
+import ref64_noise
 import nubis
-import twin
+import ref64
 from nubis.testing import probe
 
 SPOT, RADIUS = (3000.0, -2000.0), 4000.0
@@ -19,7 +19,7 @@ def points_around(rng, n, spot=SPOT, reach=2.5 * RADIUS, params=CLEAR):
     """Points at all heights of the clouds, and how far each is from the middle of the spot."""
     places = np.array(spot) + rng.uniform(-reach, reach, (n, 2))
     altitude = rng.uniform(params.clouds.base, params.clouds.top, n)
-    points = twin.from_chart(places, params.atmosphere.planet_radius, altitude)
+    points = ref64.from_chart(places, params.atmosphere.planet_radius, altitude)
     return points, np.linalg.norm(places - spot, axis=1)
 
 
@@ -45,7 +45,7 @@ def test_the_rim(rng):
     """The share of the cover by distance: a smoothstep, in float64."""
     points, _ = points_around(rng, 2000)
     got = probe("vec4f(kept_clear(x.xy))", points, imports=["density"], params=CLEAR)[:, 0]
-    expected = noise_twin.kept_clear(points, CLEAR.weather)
+    expected = ref64_noise.kept_clear(points, CLEAR.weather)
     assert 0.1 < (expected == 0).mean() < 0.9 and (expected == 1).any()
     np.testing.assert_allclose(got, expected, atol=1e-5)
 
@@ -66,12 +66,12 @@ def test_far_from_the_origin(renderer, rng):
     )
     params = everywhere.with_(**{"weather.clear_at": spot, "weather.clear_radius": 8.0})
     points, away = points_around(rng, 4000, spot, 16.0, params)
-    places = twin.on_chart(points, params.atmosphere.planet_radius)
-    cover = noise_twin.kept_clear(places, params.weather)
+    places = ref64.on_chart(points, params.atmosphere.planet_radius)
+    cover = ref64_noise.kept_clear(places, params.weather)
     got = renderer().density(points, params) / params.clouds.extinction
     full = renderer().density(points, everywhere) / params.clouds.extinction
     # With full cover the shape is what `with_coverage` makes of it with less.
-    expected = noise_twin.with_coverage(full, cover)
+    expected = ref64_noise.with_coverage(full, cover)
     assert (away < 8).any() and 0.2 < (expected > 0).mean() < 0.9
     np.testing.assert_allclose(got, expected, atol=2e-3)
 
@@ -131,4 +131,4 @@ def test_a_moving_spot_is_no_cut(renderer):
     *_, last = make.animate(shots)
     still = make.render(*shots[-1][:2], time=shots[-1][2])
     assert last.tobytes() != still.tobytes()
-    assert twin.relative_rmse(last[..., :3], still[..., :3]) < 0.4
+    assert ref64.relative_rmse(last[..., :3], still[..., :3]) < 0.4

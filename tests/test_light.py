@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 import nubis
-import twin
+import ref64
 from nubis.testing import probe
 
 MODELS = ["single", "nubis2015", "thesis2018", "vsu2022"]
 
 
 def lit_params(**changes):
-    return twin.smooth_params(
+    return ref64.smooth_params(
         **{
             "light.model": "single",
             "light.albedo": 0.9,
@@ -44,10 +44,10 @@ def test_single_scattering(renderer, view, g):
     to 2e-3.
     """
     camera, params = CAMERAS[view], lit_params(**{"light.g": g})
-    directions = twin.pixel_directions(camera, 8, 4).reshape(-1, 3)
-    time = twin.cloudy_time(renderer(), params, camera, 0.05, 0.8)
-    layers = renderer(8, 4, twin.fine(230, 128)).render_layers(camera, params, time=time)
-    expected = twin.single_scattering(renderer(), params, camera.eye, directions, 400, 200, time)
+    directions = ref64.pixel_directions(camera, 8, 4).reshape(-1, 3)
+    time = ref64.cloudy_time(renderer(), params, camera, 0.05, 0.8)
+    layers = renderer(8, 4, ref64.fine(230, 128)).render_layers(camera, params, time=time)
+    expected = ref64.single_scattering(renderer(), params, camera.eye, directions, 400, 200, time)
     np.testing.assert_allclose(
         layers["radiance"].reshape(-1, 3), expected, rtol=2e-3, atol=1e-3 * expected.mean()
     )
@@ -62,9 +62,9 @@ def test_sun_transmittance(renderer, rng, elevation):
     points = np.zeros((300, 3))
     points[:, :2] = rng.uniform(-10_000, 10_000, (300, 2))
     radius = params.atmosphere.planet_radius
-    points = twin.raised(points, radius, rng.choice([1, 500, 1100, 1500, 2200, 2900, 3500], 300))
+    points = ref64.raised(points, radius, rng.choice([1, 500, 1100, 1500, 2200, 2900, 3500], 300))
     got = renderer().sun_transmittance(points, params)
-    expected = twin.sun_transmittance(renderer(), params, points, 4000)
+    expected = ref64.sun_transmittance(renderer(), params, points, 4000)
     if elevation > 0:
         assert (got[points[:, 2] > params.clouds.top] == 1).all()
     assert np.std(expected) > 0.02
@@ -189,7 +189,7 @@ def test_octaves(count):
     call = "sun_scattering(x.x, 0.0, x.y)"
     got = probe(call, inputs, imports=["light"], params=nubis.Params().with_(**light))[:, 0]
     i = np.arange(count)[:, None]
-    phase = twin.henyey_greenstein(mu.ravel(), g * c**i)
+    phase = ref64.henyey_greenstein(mu.ravel(), g * c**i)
     expected = 0.9 * (a**i * phase * np.exp(-(b**i) * depth.ravel())).sum(axis=0)
     np.testing.assert_allclose(got, expected, rtol=1e-4, atol=1e-9)
 

@@ -9,7 +9,7 @@ import pytest
 
 import grids
 import nubis
-import twin
+import ref64
 from nubis.testing import probe
 from test_api import run_python
 
@@ -19,7 +19,7 @@ THESIS = 400_000.0
 
 def looking(height, elevation, fov_y=3.0):
     eye = np.array([0.0, 0.0, height])
-    return nubis.Camera.look_at(eye, eye + twin.compass(15, elevation), fov_y=fov_y)
+    return nubis.Camera.look_at(eye, eye + ref64.compass(15, elevation), fov_y=fov_y)
 
 
 # Narrow views, as the level of detail grows with a pixel's width. On thesis2018's planet of 400 km
@@ -41,7 +41,7 @@ VIEWS = {
 def view_params(view, **changes):
     camera, radius, extinction = VIEWS[view]
     values = {"atmosphere.planet_radius": radius, "clouds.extinction": extinction}
-    return camera, twin.smooth_params(**(values | changes))
+    return camera, ref64.smooth_params(**(values | changes))
 
 
 @pytest.mark.slow_after(3)
@@ -49,14 +49,14 @@ def view_params(view, **changes):
 def test_transmittance(renderer, view):
     """The integral in float64 starts at the eye and knows nothing of shells."""
     camera, params = view_params(view)
-    directions = twin.pixel_directions(camera, 16, 9).reshape(-1, 3)
-    time = twin.cloudy_time(renderer(), params, camera, 0.05, 0.95)
+    directions = ref64.pixel_directions(camera, 16, 9).reshape(-1, 3)
+    time = ref64.cloudy_time(renderer(), params, camera, 0.05, 0.95)
     got = (
-        renderer(16, 9, twin.fine(1024))
+        renderer(16, 9, ref64.fine(1024))
         .render_layers(camera, params, time=time)["transmittance"]
         .ravel()
     )
-    expected = twin.transmittance(renderer(), params, camera.eye, directions, 8000, time)
+    expected = ref64.transmittance(renderer(), params, camera.eye, directions, 8000, time)
     np.testing.assert_allclose(got, expected, atol=3e-4)
 
 
@@ -64,10 +64,10 @@ def test_transmittance(renderer, view):
 def test_more_steps_converge(renderer, view):
     """Twice the steps, a third of the error or less: the rule is of second order."""
     camera, params = view_params(view)
-    time = twin.cloudy_time(renderer(), params, camera, 0.05, 0.95)
+    time = ref64.cloudy_time(renderer(), params, camera, 0.05, 0.95)
     counts = (32, 64, 128, 1024)
     layers = {
-        n: renderer(16, 9, twin.fine(n)).render_layers(camera, params, time=time) for n in counts
+        n: renderer(16, 9, ref64.fine(n)).render_layers(camera, params, time=time) for n in counts
     }
     expected = layers.pop(1024)["transmittance"]
     error = [np.sqrt(np.mean((v["transmittance"] - expected) ** 2)) for v in layers.values()]
@@ -167,7 +167,7 @@ def test_a_veil_does_not_move_the_light_of_the_cloud_behind(renderer):
         }
     )
     camera = nubis.Camera.look_at((-500, 0, 1000), (0, 0, 1000), fov_y=2)
-    fine = twin.fine(600, 32)
+    fine = ref64.fine(600, 32)
     each, together = (
         renderer(8, 4, fine.replace(light_share=share)).render_layers(camera, params)
         for share in (0.0, 0.1)
@@ -182,10 +182,10 @@ def test_a_veil_does_not_move_the_light_of_the_cloud_behind(renderer):
 def test_jitter_spreads_the_error_and_adds_none(renderer):
     """Each ray of its own starts elsewhere; over the picture the mean stays."""
     camera, params = view_params("below")
-    time = twin.cloudy_time(renderer(), params, camera, 0.05, 0.8)
+    time = ref64.cloudy_time(renderer(), params, camera, 0.05, 0.8)
     straight, jittered, exact = (
         renderer(64, 36, method).render_layers(camera, params, time=time)["transmittance"]
-        for method in (twin.fine(24), twin.fine(24, jitter=True), twin.fine(1024))
+        for method in (ref64.fine(24), ref64.fine(24, jitter=True), ref64.fine(1024))
     )
     assert not np.array_equal(straight, jittered)
     assert abs(np.mean(jittered - exact)) < 2e-3
@@ -200,9 +200,9 @@ def test_the_end_of_a_ray_is_not_lost(renderer):
     percent.
     """
     camera, params = view_params("above", **{"clouds.extinction": 0.05, "light.model": "single"})
-    time = twin.cloudy_time(renderer(), params, camera, 0, 1e-3)
+    time = ref64.cloudy_time(renderer(), params, camera, 0, 1e-3)
     to_the_end, cut = (
-        renderer(16, 9, twin.fine(512, 16, min_transmittance=m)).render_layers(
+        renderer(16, 9, ref64.fine(512, 16, min_transmittance=m)).render_layers(
             camera, params, time=time
         )
         for m in (0.0, 0.1)
@@ -219,7 +219,7 @@ def test_big_steps_find_the_same_clouds(renderer):
     """
     camera, params = nubis.scenes["fair_weather"]
     small, big = (
-        renderer(48, 27, twin.fine(192, big_step=b, leap=0.0, empty_samples=6)).render_layers(
+        renderer(48, 27, ref64.fine(192, big_step=b, leap=0.0, empty_samples=6)).render_layers(
             camera, params
         )
         for b in (1, 4)
@@ -232,7 +232,7 @@ def test_big_steps_find_the_same_clouds(renderer):
 
 def _searching(**changes):
     """A method whose steps are small; what it finds depends on how it searches alone."""
-    return twin.fine(96, steps_horizon=192, empty_samples=6, **changes)
+    return ref64.fine(96, steps_horizon=192, empty_samples=6, **changes)
 
 
 @pytest.mark.slow_after(2)
@@ -371,15 +371,15 @@ def test_only_rays_that_meet_the_shell_are_marched(renderer, height, radius):
     """No sample where the ray misses the shell, past the horizon or beside the planet; some
     everywhere else.
     """
-    params = twin.smooth_params(**{"atmosphere.planet_radius": radius})
+    params = ref64.smooth_params(**{"atmosphere.planet_radius": radius})
     camera = looking(height, -5, 60)
-    directions = twin.pixel_directions(camera, 64, 64).reshape(-1, 3)
-    layers = renderer(64, 64, twin.fine(64)).render_layers(camera, params)
+    directions = ref64.pixel_directions(camera, 64, 64).reshape(-1, 3)
+    layers = renderer(64, 64, ref64.fine(64)).render_layers(camera, params)
     samples = layers["samples"].ravel()
     eye = np.array(camera.eye)
 
     def in_front(altitude):
-        near, far = twin.sphere_hits(eye, directions, radius, altitude)
+        near, far = ref64.sphere_hits(eye, directions, radius, altitude)
         return near, far, far > 0
 
     near_top, _, meets_top = in_front(params.clouds.top)
@@ -401,10 +401,10 @@ def test_only_rays_that_meet_the_shell_are_marched(renderer, height, radius):
 
 def test_the_horizon_hides_what_is_beyond(renderer):
     """From 2 m the ground hides every cloud below it; dense clouds stand right above it."""
-    params = twin.smooth_params(**{"clouds.extinction": 0.1})
+    params = ref64.smooth_params(**{"clouds.extinction": 0.1})
     camera = looking(2, 0, 20)
     layers = renderer(9, 64).render_layers(camera, params)
-    elevation = np.arcsin(twin.pixel_directions(camera, 9, 64)[..., 2])
+    elevation = np.arcsin(ref64.pixel_directions(camera, 9, 64)[..., 2])
     dip = np.arccos(EARTH / (EARTH + 2))
     assert (layers["transmittance"][elevation < -dip] == 1).all()
     assert (layers["samples"][elevation < -dip] == 0).all()
@@ -448,12 +448,12 @@ def test_depth_is_where_the_cloud_is(renderer):
     light to come from.
     """
     camera, params = view_params("below")
-    directions = twin.pixel_directions(camera, 16, 9).reshape(-1, 3)
-    time = twin.cloudy_time(renderer(), params, camera, 0.05, 0.8)
-    layers = renderer(16, 9, twin.fine(512)).render_layers(camera, params, time=time)
+    directions = ref64.pixel_directions(camera, 16, 9).reshape(-1, 3)
+    time = ref64.cloudy_time(renderer(), params, camera, 0.05, 0.8)
+    layers = renderer(16, 9, ref64.fine(512)).render_layers(camera, params, time=time)
     starts = np.broadcast_to(np.array(camera.eye), directions.shape)
-    ends = twin.ray_ends(camera.eye, directions, params)
-    depth, points = twin.optical_depths(renderer(), params, starts, directions, ends, 4000, time)
+    ends = ref64.ray_ends(camera.eye, directions, params)
+    depth, points = ref64.optical_depths(renderer(), params, starts, directions, ends, 4000, time)
     weight = np.exp(depth - np.cumsum(depth, axis=1)) * -np.expm1(-depth)
     distance = np.linalg.norm(points - starts[:, None], axis=2)
     expected = (weight * distance).sum(axis=1) / weight.sum(axis=1)
@@ -470,7 +470,7 @@ def test_a_wide_view_is_made_of_narrow_ones(renderer):
     narrow = 2 * np.degrees(np.arctan(np.tan(np.radians(30)) / 3))
     middle = renderer(40, 24, method).render(looking(200, 15, narrow), params)
     np.testing.assert_allclose(whole[24:48], middle, rtol=2e-2, atol=2e-3)
-    assert twin.relative_rmse(whole[24:48, :, :3], middle[..., :3]) < 1e-3
+    assert ref64.relative_rmse(whole[24:48, :, :3], middle[..., :3]) < 1e-3
 
 
 def test_bands_do_not_show(renderer):
@@ -494,7 +494,7 @@ def test_workgroups_do_each_part_once(count):
     """And where threads share them out by their numbers, the first has one of each few."""
     numbers = np.arange(count)
     x = np.stack([numbers, np.full(count, count)], axis=-1)
-    parts = probe("f32(spread(u32(x.x), u32(x.y)))", x, imports=["workgroups"])[:, 0]
+    parts = probe("f32(swizzle_workgroup(u32(x.x), u32(x.y)))", x, imports=["workgroups"])[:, 0]
     np.testing.assert_array_equal(np.sort(parts), numbers)
     threads = int(probe("f32(dispatch.threads)", [0.0])[0, 0])
     assert threads >= 1

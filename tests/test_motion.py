@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import nubis
-import twin
+import ref64
 
 SIZE = 240, 135
 EYES = {
@@ -20,8 +20,8 @@ EYES = {
 
 def look(scene, turn=0.0, forward=0.0):
     eye, azimuth, pitch = EYES[scene]
-    eye = np.add(eye, forward * twin.compass(azimuth))
-    return nubis.Camera.look_at(eye, eye + twin.compass(azimuth + turn, pitch))
+    eye = np.add(eye, forward * ref64.compass(azimuth))
+    return nubis.Camera.look_at(eye, eye + ref64.compass(azimuth + turn, pitch))
 
 
 def sky(scene, **fields):
@@ -41,7 +41,7 @@ def all_rays(shot, quality="draft"):
 
 
 def error(frame, still):
-    return twin.relative_rmse(frame[..., :3], still[..., :3])
+    return ref64.relative_rmse(frame[..., :3], still[..., :3])
 
 
 HARDLY = {

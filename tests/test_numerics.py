@@ -1,11 +1,11 @@
-"""Shader functions that stay exact where the textbook form does not, against float64 twins."""
+"""Shader functions that stay exact where the textbook form does not, against float64 references."""
 
 import numpy as np
 import pytest
 
 import nubis
-import twin
-from noise_twin import f32, random3
+import ref64
+from ref64_noise import f32, random3
 from nubis.testing import probe
 
 EARTH = 6_371_000.0
@@ -35,7 +35,7 @@ def test_remap_is_clamped_and_finite():
     assert got.min() == 0 and got.max() == 1
     v, a, b = f32(inputs).T
     proper = b > a
-    expected = np.clip(twin.remap(v[proper], a[proper], b[proper]), 0, 1)
+    expected = np.clip(ref64.remap(v[proper], a[proper], b[proper]), 0, 1)
     np.testing.assert_allclose(got[proper], expected, atol=1e-6)
     # A range without width is a step.
     empty = b == a
@@ -47,20 +47,20 @@ def test_altitude(radius):
     """Subtracting the radius from a length is 0.8 m off at 100 km on Earth."""
     level = np.logspace(0, 5, 60)
     points = np.concatenate(
-        [[x * twin.compass(200, e) for x in level] for e in (-1, 0, 0.5, 5, 40, 90)]
+        [[x * ref64.compass(200, e) for x in level] for e in (-1, 0, 0.5, 5, 40, 90)]
     )
     params = nubis.Params().with_(**{"atmosphere.planet_radius": radius})
     got = probe("altitude_at(x.xyz)", points, imports=["shell"], params=params)[:, 0]
-    expected = twin.altitude(f32(points), radius)
+    expected = ref64.altitude(f32(points), radius)
     np.testing.assert_allclose(got, expected, rtol=1e-6, atol=0.02)
 
 
 def test_cosine_to_the_local_zenith(rng):
     points = f32(rng.uniform(-1, 1, (500, 3)) * [2e5, 2e5, 1e4])
-    direction = twin.compass(130, 10)
+    direction = ref64.compass(130, 10)
     wgsl = "cos_zenith_at(x.xyz, vec3f({}, {}, {}))".format(*direction)
     got = probe(wgsl, points, imports=["shell"])[:, 0]
-    expected = twin.normalized(twin.from_centre(points, EARTH)) @ direction
+    expected = ref64.normalized(ref64.from_centre(points, EARTH)) @ direction
     np.testing.assert_allclose(got, expected, atol=3e-7)
 
 
@@ -70,12 +70,12 @@ def test_distance_to_a_shell_from_the_ground(height):
     1.5 km.
     """
     elevations = [0, 0.01, 0.1, 1, 5, 20, 45, 80, 90]
-    directions = f32([twin.compass(30, e) for e in elevations])
+    directions = f32([ref64.compass(30, e) for e in elevations])
     params = nubis.Params().with_(**{"clouds.base": height, "clouds.top": height + 1000})
     hit = "hit_sphere(x.xyz, frame.view.power_base)"
     wgsl = f"vec4f({hit}.near, {hit}.far, 0.0, 0.0)"
     near, far = probe(wgsl, directions, imports=["shell"], params=params)[:, :2].T
-    expected = twin.sphere_hits((0, 0, 0), twin.normalized(directions), EARTH, height)[1]
+    expected = ref64.sphere_hits((0, 0, 0), ref64.normalized(directions), EARTH, height)[1]
     assert (near == 0).all()
     np.testing.assert_allclose(far, expected, rtol=2e-6, atol=0.02)
 

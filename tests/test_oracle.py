@@ -13,7 +13,7 @@ import pytest
 
 import grids
 import nubis
-import twin
+import ref64
 
 REFERENCES = Path(__file__).parent / "references"
 EXACT = sorted(p.stem.removeprefix("exact_") for p in REFERENCES.glob("exact_*.json"))
@@ -79,7 +79,7 @@ def test_stored_pictures_against_a_plain_marcher(name):
     """
     case, want = stored(f"exact_{name}")
     grid = grids.make(case["grid"], case["scale"])
-    directions = twin.pixel_directions(camera_of(case), case["width"], case["height"])
+    directions = ref64.pixel_directions(camera_of(case), case["width"], case["height"])
     some = (slice(2, None, 4), slice(1, None, 5))
     clear = grids.transmittance(*grid, case["eye"], directions[some], 1000)
     np.testing.assert_allclose(clear, want["transmittance"][some], atol=2e-3)
@@ -87,8 +87,8 @@ def test_stored_pictures_against_a_plain_marcher(name):
     # From the brightest pixel down, as most are dark.
     few = np.argsort(want["radiance"], axis=None)[-1:-700:-100]
     directions = directions.reshape(-1, 3)[few]
-    sun = twin.compass(case["azimuth"], case["elevation"])
-    got = case["albedo"] * twin.henyey_greenstein(directions @ sun, case["g"])
+    sun = ref64.compass(case["azimuth"], case["elevation"])
+    got = case["albedo"] * ref64.henyey_greenstein(directions @ sun, case["g"])
     got = got * grids.single_scattering(*grid, case["eye"], directions, sun, 200)
     expected = want["radiance"].ravel()[few]
     np.testing.assert_allclose(got, expected, rtol=2e-2, atol=2e-3 * expected[0])
@@ -116,12 +116,12 @@ PEAKED = {"blob_against": 0.015}
 def phase_over_pixels(case, fine=32):
     """Mean of the phase function over each pixel, as a share of its value in the middle."""
     camera, width, height = camera_of(case), case["width"], case["height"]
-    sun = twin.compass(case["azimuth"], case["elevation"])
+    sun = ref64.compass(case["azimuth"], case["elevation"])
 
     def phase(columns, rows):
-        directions = twin.pixel_directions(camera, columns, rows)
+        directions = ref64.pixel_directions(camera, columns, rows)
         weight = (directions @ np.array(camera.forward)) ** 3  # solid angle
-        return twin.henyey_greenstein(directions @ sun, case["g"]), weight
+        return ref64.henyey_greenstein(directions @ sun, case["g"]), weight
 
     values, weights = phase(width * fine, height * fine)
     sums = [v.reshape(height, fine, width, fine).sum((1, 3)) for v in (values * weights, weights)]
@@ -143,7 +143,7 @@ def test_single_scattering(renderer, quality, name):
     # The references look through the middles of pixels, the renderer shows their means.
     radiance = (want["radiance"] * phase_over_pixels(case))[cloudy]
     expected = np.broadcast_to(radiance[:, None], got.shape)
-    assert twin.relative_rmse(got, expected) <= rmse + PEAKED.get(name, 0.0)
+    assert ref64.relative_rmse(got, expected) <= rmse + PEAKED.get(name, 0.0)
     assert abs(got.mean() / expected.mean() - 1) <= bias
     dark = (want["radiance"] == 0) & (want["transmittance"] == 1)
     assert (layers["radiance"][dark] == 0).all()
@@ -160,7 +160,7 @@ def test_order_of_convergence(renderer, name):
     camera, params = scene(case)
 
     def clear(n):
-        make = renderer(case["width"], case["height"], twin.fine(n))
+        make = renderer(case["width"], case["height"], ref64.fine(n))
         return make.render_layers(camera, params)["transmittance"]
 
     steps, limit = [16, 32, 64, 128], clear(2048)
@@ -190,7 +190,7 @@ def test_density_and_sun(renderer, rng, name):
     np.testing.assert_allclose(got, want, rtol=1e-5, atol=4e-6 * extinction.max())
     some = points[:120]
     got = renderer(8, 8, "reference").sun_transmittance(some, params)
-    sun = np.broadcast_to(twin.sun_direction(params), some.shape)
+    sun = np.broadcast_to(ref64.sun_direction(params), some.shape)
     want = np.exp(-grids.march(extinction, bounds, some, sun, 3000)[0].sum(axis=1))
     np.testing.assert_allclose(got, want, atol=1e-3)
 
@@ -212,7 +212,7 @@ def view_of_slab(cosine, azimuth, fov_y, thickness=100.0):
     """A camera 50 m away from the face whose light it sees: light that travels upward (positive
     cosine) is seen from above.
     """
-    direction = twin.compass(azimuth, -math.degrees(math.asin(cosine)))
+    direction = ref64.compass(azimuth, -math.degrees(math.asin(cosine)))
     face = np.array([0, 0, BOTTOM + (thickness if cosine > 0 else 0)])
     eye = face - 50 * direction
     return nubis.Camera.look_at(eye, eye + direction, (0, 0, 1), fov_y)
@@ -227,9 +227,9 @@ def test_homogeneous_slab(renderer, quality, atol, shape):
     params = cloud(np.full(shape, 0.01, dtype=np.float32), bounds)
     for elevation in (50, -50):
         eye = np.array([100.0, 200.0, 1050 - 400 * np.sign(elevation)])
-        camera = nubis.Camera.look_at(eye, eye + twin.compass(20, elevation), fov_y=50)
+        camera = nubis.Camera.look_at(eye, eye + ref64.compass(20, elevation), fov_y=50)
         got = renderer(16, 9, quality).render_layers(camera, params)["transmittance"]
-        cosine = np.abs(twin.pixel_directions(camera, 16, 9)[..., 2])
+        cosine = np.abs(ref64.pixel_directions(camera, 16, 9)[..., 2])
         np.testing.assert_allclose(got, np.exp(-1 / cosine), atol=atol)
 
 
@@ -253,7 +253,7 @@ def test_linear_extinction(renderer, height, down):
     camera = nubis.Camera.look_at((0, 0, height), (0, 100, height + (-150 if down else 150)))
     got = renderer(8, 6, "reference").render_layers(camera, params)["transmittance"]
     depth = below(height) if down else below(1400) - below(height)
-    cosine = np.abs(twin.pixel_directions(camera, 8, 6)[..., 2])
+    cosine = np.abs(ref64.pixel_directions(camera, 8, 6)[..., 2])
     np.testing.assert_allclose(got, np.exp(-depth / cosine), atol=1e-5)
 
 
@@ -289,7 +289,7 @@ def test_single_scattering_of_a_box(renderer, sun, g):
             "ahead": s * SIDE * math.exp(-s * SIDE),
         }[sun]
         cosine = {"above": 0, "behind": -1, "ahead": 1}[sun]
-        expected = albedo * twin.henyey_greenstein(cosine, g) * expected * IRRADIANCE
+        expected = albedo * ref64.henyey_greenstein(cosine, g) * expected * IRRADIANCE
         np.testing.assert_allclose(layers["radiance"][0, 0], expected, rtol=1e-4)
 
 
@@ -303,14 +303,14 @@ def test_single_scattering_of_a_slab(renderer, depth, cosine):
     params = slab(depth, **changes, **{"light.albedo": 1.0})
     camera = view_of_slab(cosine, 75, 40)
     got = renderer(8, 8, "reference").render_layers(camera, params)["radiance"]
-    directions = twin.pixel_directions(camera, 8, 8)
+    directions = ref64.pixel_directions(camera, 8, 8)
     mu = np.abs(directions[..., 2])
     if cosine > 0:
         weight = sun / (sun + mu) * -np.expm1(-depth * (1 / sun + 1 / mu))
     else:
         x = depth * (1 / sun - 1 / mu)
         weight = depth / mu * np.exp(-depth / mu) * -np.expm1(-x) / x
-    weight = weight * twin.henyey_greenstein(directions @ twin.sun_direction(params), g)
+    weight = weight * ref64.henyey_greenstein(directions @ ref64.sun_direction(params), g)
     np.testing.assert_allclose(got, weight[..., None] * IRRADIANCE, rtol=1e-3)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import nubis
-import twin
+import ref64
 from nubis.testing import probe
 
 G = [-0.9, -0.6, -0.25, 0.0, 0.25, 0.6, 0.9, 0.99, 0.999]
@@ -41,7 +41,7 @@ def test_peak(g, sign):
     v = 2 * np.sin(angle / 2) ** 2
     v = (v if sign > 0 else 2 - v).astype(np.float32).astype(np.longdouble)
     g = float(np.float32(sign * g))
-    np.testing.assert_allclose(shader_hg(v, g), twin.henyey_greenstein(1 - v, g), rtol=2e-5)
+    np.testing.assert_allclose(shader_hg(v, g), ref64.henyey_greenstein(1 - v, g), rtol=2e-5)
 
 
 def test_cosine_without_cancellation():
@@ -70,7 +70,7 @@ def test_phase_of_a_model(model):
     )
     mu = np.linspace(-1, 1, 41)
     got = probe("model_phase(x.x)", 1 - mu, imports=["light"], params=params)[:, 0]
-    forward, backward = twin.henyey_greenstein(mu, g), twin.henyey_greenstein(mu, back)
+    forward, backward = ref64.henyey_greenstein(mu, g), ref64.henyey_greenstein(mu, back)
     expected = {
         "single": forward,
         "nubis2015": forward,
@@ -128,7 +128,7 @@ def test_fit_of_droplets(diameter, peak):
     v = sphere()
     params = droplets("droplet", diameter)
     got = cloud_phase(v, params, f"droplet_fit(x.x, {peak})")
-    np.testing.assert_allclose(got, twin.droplet(1 - v.astype(np.longdouble), diameter, peak), 2e-4)
+    np.testing.assert_allclose(got, ref64.droplet(1 - v.astype(np.longdouble), diameter, peak), 2e-4)
     if peak == 1:
         np.testing.assert_array_equal(cloud_phase(v, params), got)
     if peak == 0:
@@ -184,7 +184,7 @@ def test_droplets_in_every_model(model):
             continue
         got = cloud_phase(v, params, f"sun_scattering({depth}, 0.0, x.x)")
         expected = first * np.exp(-depth) + sum(
-            0.6**i * twin.droplet(1 - v, 20.0, 0.4**i) * np.exp(-(0.3**i) * depth) for i in (1, 2)
+            0.6**i * ref64.droplet(1 - v, 20.0, 0.4**i) * np.exp(-(0.3**i) * depth) for i in (1, 2)
         )
         np.testing.assert_allclose(got, 0.9 * expected, rtol=2e-4)
 
@@ -250,7 +250,7 @@ def test_paths_of_one_scattering(renderer, phase):
     """A path cut after its first scattering is single scattering, whatever the function: in a
     box of fog, toward the sun, at the bow and at the glory.
     """
-    params = twin.smooth_params(
+    params = ref64.smooth_params(
         **{
             "light.phase": phase,
             "light.droplet_diameter": 10.0,
@@ -266,7 +266,7 @@ def test_paths_of_one_scattering(renderer, phase):
     grid = nubis.DensityGrid(np.full((2, 2, 2), 1e-3, np.float32), (low, high))
     params = params.replace(volume=grid)
     path = nubis.quality("draft").replace(path_samples=400, path_scatterings=1)
-    sun = twin.sun_direction(params)
+    sun = ref64.sun_direction(params)
     for degrees in (0.0, 40.0, 142.0, 178.0):
         # In the vertical plane of the sun, away from the zenith.
         across = np.cross(np.cross(sun, [0, 0, 1.0]), sun)

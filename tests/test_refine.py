@@ -36,7 +36,7 @@ def around(n, size, step):
     return [max(n - step, 0), n, min(n + step, size - 1)]
 
 
-def twin(rays, contrast, backdrop):
+def ref64(rays, contrast, backdrop):
     """What `refine` makes of the rays of all pixels, and which of them it takes.
 
     For pictures whose last column and row are multiples of four.
@@ -73,7 +73,7 @@ def test_it_does_what_its_twin_does(contrast):
     backdrop = probe(
         "sky_light[0]", [[0.0]], imports=["light"], params=nubis.scenes["fair_weather"][1]
     )
-    expected = twin(rays, contrast, backdrop[0, :3].max())
+    expected = ref64(rays, contrast, backdrop[0, :3].max())
     differs = np.abs(got - expected).max(axis=-1) > 1e-4
     assert np.mean(differs) < 0.02
     assert np.abs(got - rays).max() > 10 * contrast * 1e-3

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import nubis
-import twin
+import ref64
 
 SIZE = 32, 18
 INF = np.float32(np.inf)
@@ -15,7 +15,7 @@ CAMERA = nubis.Camera.look_at((0, 0, 200), (0, 3000, 2200), (0, 0, 1), 20.0)
 
 
 def single(**changes):
-    return twin.smooth_params(**{"light.model": "single", "light.g": 0.3} | changes)
+    return ref64.smooth_params(**{"light.model": "single", "light.g": 0.3} | changes)
 
 
 def mountain():
@@ -33,13 +33,13 @@ def narrow(camera):
 
 
 def cut_twin(monkeypatch, depth, function, *args):
-    """A twin whose rays end at the scene."""
-    ends = twin.ray_ends
+    """A ref64 whose rays end at the scene."""
+    ends = ref64.ray_ends
 
     def cut(eye, directions, params):
         return np.minimum(ends(eye, directions, params), depth.ravel())
 
-    monkeypatch.setattr(twin, "ray_ends", cut)
+    monkeypatch.setattr(ref64, "ray_ends", cut)
     return function(*args)
 
 
@@ -50,14 +50,14 @@ def test_mountain_in_the_clouds(renderer, monkeypatch, method):
     scattering and transmittance, 1 % RMS.
     """
     params, depth = single(), mountain()
-    quality = twin.fine(400, 40) if method == "march" else "reference"
+    quality = ref64.fine(400, 40) if method == "march" else "reference"
     ours = nubis.Renderer(*SIZE, quality=quality)
-    time = twin.cloudy_time(ours, params, CAMERA, 0.2, 0.7)
+    time = ref64.cloudy_time(ours, params, CAMERA, 0.2, 0.7)
     layers = ours.render_layers(CAMERA, params, time=time, scene_depth=depth)
-    directions = twin.pixel_directions(CAMERA, *SIZE).reshape(-1, 3)
+    directions = ref64.pixel_directions(CAMERA, *SIZE).reshape(-1, 3)
     eye = np.array(CAMERA.eye)
     seen = cut_twin(
-        monkeypatch, depth, twin.transmittance, ours, params, eye, directions, 800, time
+        monkeypatch, depth, ref64.transmittance, ours, params, eye, directions, 800, time
     ).reshape(depth.shape)
     whole = ours.render_layers(CAMERA, params, time=time)["transmittance"]
     # The mountain is in front of cloud, behind cloud, and within it.
@@ -65,8 +65,8 @@ def test_mountain_in_the_clouds(renderer, monkeypatch, method):
     assert front.sum() > 20 and behind.sum() > 20
     assert ((seen < 0.9) & (seen > whole + 0.1)).sum() > 20
     assert np.abs(layers["transmittance"] - seen).max() < 0.01
-    light = twin.single_scattering(ours, params, eye, directions, 300, 100, time)
-    assert twin.relative_rmse(layers["radiance"].reshape(-1, 3), light) < 0.01
+    light = ref64.single_scattering(ours, params, eye, directions, 300, 100, time)
+    assert ref64.relative_rmse(layers["radiance"].reshape(-1, 3), light) < 0.01
 
 
 @pytest.mark.slow
@@ -75,11 +75,11 @@ def test_path_tracing_ends_at_the_scene(monkeypatch):
     params, depth = single(**{"light.model": "path"}), mountain()
     quality = nubis.quality("balanced").replace(path_samples=256, path_scatterings=1)
     ours = nubis.Renderer(*SIZE, quality=quality)
-    time = twin.cloudy_time(ours, params, CAMERA, 0.2, 0.7)
+    time = ref64.cloudy_time(ours, params, CAMERA, 0.2, 0.7)
     layers = ours.render_layers(CAMERA, params, time=time, scene_depth=depth)
-    directions = twin.pixel_directions(CAMERA, *SIZE).reshape(-1, 3)
+    directions = ref64.pixel_directions(CAMERA, *SIZE).reshape(-1, 3)
     seen = cut_twin(
-        monkeypatch, depth, twin.transmittance, ours, params, CAMERA.eye, directions, 800, time
+        monkeypatch, depth, ref64.transmittance, ours, params, CAMERA.eye, directions, 800, time
     ).reshape(depth.shape)
     error = np.sqrt(seen * (1 - seen) / 256) + 0.002
     assert (np.abs(layers["transmittance"] - seen) < 5 * error).all()
@@ -206,7 +206,7 @@ def test_high_clouds_and_sun_are_behind_it():
     params = nubis.Params().with_(
         **{"clouds.coverage": 0.0, "high_clouds.coverage": 1.0, "high_clouds.optical_depth": 3.0}
     )
-    toward = 1000.0 * twin.sun_direction(params)
+    toward = 1000.0 * ref64.sun_direction(params)
     camera = nubis.Camera.look_at((0, 0, 100), np.add((0, 0, 100), toward), (0, 0, 1), 4.0)
     ours = nubis.Renderer(*SIZE, quality="draft")
     open_sky = ours.render_layers(camera, params)
@@ -258,8 +258,8 @@ def test_an_animation_of_a_scene_that_stands_still_becomes_the_still():
     still = ours.render(*CLOUDY, scene_depth=depth, scene_color=color)
     first, *_, last = ours.animate([shot] * 32)
     assert np.array_equal(first, still)
-    assert twin.relative_rmse(last, still) < 1e-3
-    assert twin.relative_rmse(ours.render(*CLOUDY), still) > 0.1
+    assert ref64.relative_rmse(last, still) < 1e-3
+    assert ref64.relative_rmse(ours.render(*CLOUDY), still) > 0.1
 
 
 @pytest.mark.slow_after(1)
@@ -284,7 +284,7 @@ def test_an_edge_that_moves_leaves_no_ghost(background):
         if changed.any():
             assert np.abs(ghost[changed] - still[changed]).max() > 0.2
         # What has not changed is clamped to what is marched around it, here on a coarse lattice.
-        assert twin.relative_rmse(frame, still) < 0.1
+        assert ref64.relative_rmse(frame, still) < 0.1
 
 
 def flight(i, size):
@@ -292,7 +292,7 @@ def flight(i, size):
     camera, params = CLOUDY
     eye = np.array([12.0 * i, 8.0 * i, 600.0])
     camera = nubis.Camera.look_at(eye, eye + np.array([0, 1000, 150]), (0, 0, 1), 50.0)
-    rays = twin.pixel_directions(camera, *size)
+    rays = ref64.pixel_directions(camera, *size)
     depth = np.full(size[::-1], np.inf)
     with np.errstate(divide="ignore", invalid="ignore"):
         wall = (6000.0 - eye[1]) / rays[..., 1]
@@ -315,10 +315,10 @@ def test_a_flight_past_a_scene_is_as_near_the_stills_as_without():
     errors, plain = [], []
     bare = ours.animate([shot[:3] for shot in shots])
     for shot, frame in zip(shots, list(bare), strict=True):
-        plain.append(twin.relative_rmse(frame, other.render(*shot[:2], time=shot[2])))
+        plain.append(ref64.relative_rmse(frame, other.render(*shot[:2], time=shot[2])))
     for i, (shot, frame) in enumerate(zip(shots, ours.animate(shots), strict=True)):
         still = other.render(*shot[:2], time=shot[2], scene_depth=shot[3])
-        errors.append(twin.relative_rmse(frame, still))
+        errors.append(ref64.relative_rmse(frame, still))
         edge = np.zeros(size[::-1], dtype=bool)
         for axis in 0, 1:
             step = np.diff(np.minimum(shot[3], 1e6), axis=axis) ** 2 > 1e6
@@ -363,7 +363,7 @@ def test_distance_from_z():
     z = np.full((36, 64), 1000.0)
     z[3, 5] = np.inf
     distance = nubis.distance_from_z(CAMERA, z)
-    directions = twin.pixel_directions(CAMERA, 64, 36)
+    directions = ref64.pixel_directions(CAMERA, 64, 36)
     along = distance * (directions @ np.array(CAMERA.forward))
     assert np.allclose(along[np.isfinite(z)], 1000.0, rtol=1e-6) and np.isinf(distance[3, 5])
     with pytest.raises(nubis.ParameterError, match="pinhole"):

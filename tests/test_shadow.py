@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import nubis
-import twin
+import ref64
 from nubis.testing import probe
 
 DOWN = nubis.Camera.look_at((0, 0, 6000), (0, 5000, 0), (0, 0, 1), 50.0)
@@ -49,10 +49,10 @@ def test_map_is_sun_transmittance(renderer, scene):
 
 def test_map_is_the_marched_reference(renderer):
     """Against float64 rays through the renderer's own density."""
-    params = twin.smooth_params(**{"sun.elevation": 35.0})
+    params = ref64.smooth_params(**{"sun.elevation": 35.0})
     shadow = renderer().shadow_map(params, extent=30_000.0, size=24)
     points = centres(shadow).reshape(-1, 3)
-    expected = twin.sun_transmittance(renderer(), params, points, 600)
+    expected = ref64.sun_transmittance(renderer(), params, points, 600)
     assert expected.std() > 0.1
     assert rms(shadow.transmittance.ravel() - expected) < 0.005
 
@@ -139,9 +139,9 @@ def test_maps_that_are_none(renderer, changes, message):
 
 def ground_points(camera, params):
     """Where the rays of a picture meet the ground, NaN where they do not."""
-    directions = twin.pixel_directions(camera, *SIZE).reshape(-1, 3)
+    directions = ref64.pixel_directions(camera, *SIZE).reshape(-1, 3)
     radius = params.atmosphere.planet_radius
-    near = twin.sphere_hits(np.array(camera.eye), directions, radius, 0.0)[0]
+    near = ref64.sphere_hits(np.array(camera.eye), directions, radius, 0.0)[0]
     return np.array(camera.eye) + np.where(near > 0, near, np.nan)[:, None] * directions
 
 
@@ -160,7 +160,7 @@ def test_shadows_on_the_ground_of_pictures(renderer, eye, time):
     """Direct sun times transmittance, against `sun_transmittance` where each pixel's ray meets the
     ground: 2 % of the radiance of the ground, RMS, where shadows are as smooth as the levels.
     """
-    params = twin.smooth_params(**{"atmosphere.enabled": True, "sun.elevation": 50.0})
+    params = ref64.smooth_params(**{"atmosphere.enabled": True, "sun.elevation": 50.0})
     camera = nubis.Camera.look_at(eye, np.add(eye, (0, 3500, -5000)), (0, 0, 1), 50.0)
     points = ground_points(camera, params)
     open_ground = seen_ground(camera, params, time, **{"atmosphere.ground_shadows": False})
@@ -170,9 +170,9 @@ def test_shadows_on_the_ground_of_pictures(renderer, eye, time):
     assert sun.std() > 0.1
     expected = full_shadow + sun * (open_ground - full_shadow)
     shadowed = seen_ground(camera, params, time)
-    assert twin.relative_rmse(shadowed, expected) < 0.02
+    assert ref64.relative_rmse(shadowed, expected) < 0.02
     # Not merely because shadows are faint: the direct sun is most of the light.
-    assert twin.relative_rmse(open_ground, expected) > 0.1
+    assert ref64.relative_rmse(open_ground, expected) > 0.1
 
 
 def test_direct_sun_on_the_ground():
@@ -215,8 +215,8 @@ def test_high_clouds_cast_shadows(renderer):
     full = {"high_clouds.coverage": 1.0, "high_clouds.optical_depth": 100.0}
     full_shadow = seen_ground(DOWN, params, **full)
     expected = full_shadow + sun * (open_ground - full_shadow)
-    assert twin.relative_rmse(seen_ground(DOWN, params), expected) < 0.01
-    assert twin.relative_rmse(open_ground, expected) > 0.1
+    assert ref64.relative_rmse(seen_ground(DOWN, params), expected) < 0.01
+    assert ref64.relative_rmse(open_ground, expected) > 0.1
 
 
 def test_shadows_of_a_grid():
@@ -300,14 +300,14 @@ def test_pictures_do_not_depend_on_those_before():
 
 def test_sun_visibility_is_a_mean_over_the_disc(renderer):
     """Against `sun_transmittance` for a sun that stands at each of many points of the disc."""
-    params = twin.smooth_params(**{"sun.elevation": 40.0, "clouds.extinction": 0.01})
+    params = ref64.smooth_params(**{"sun.elevation": 40.0, "clouds.extinction": 0.01})
     eye = np.array([0.0, 0.0, 100.0])
-    camera = nubis.Camera.look_at(eye, eye + twin.sun_direction(params), (0, 0, 1), 1.0)
+    camera = nubis.Camera.look_at(eye, eye + ref64.sun_direction(params), (0, 0, 1), 1.0)
     ours = nubis.Renderer(200, 200, quality="draft")  # pixels far smaller than the disc
     points = np.stack([np.linspace(-20_000, 20_000, 40), np.zeros(40), np.full(40, 100.0)], axis=-1)
     sun = renderer().sun_transmittance(points, params)
     eye = points[np.argmin(np.abs(sun - 0.4))]
-    camera = nubis.Camera.look_at(eye, eye + twin.sun_direction(params), (0, 0, 1), 1.0)
+    camera = nubis.Camera.look_at(eye, eye + ref64.sun_direction(params), (0, 0, 1), 1.0)
     rng = np.random.default_rng(8)
     radius = 0.2666 * np.sqrt(rng.uniform(size=12))
     angle = 2 * np.pi * (np.arange(12) + rng.uniform(size=12)) / 12
@@ -370,7 +370,7 @@ def test_sun_visibility_over_ground_and_scene():
 
     def direct(elevation, camera=None, scene_depth=None):
         low = params.with_(**{"sun.elevation": elevation})
-        toward = 1e3 * twin.sun_direction(low) + np.array([0, 0, 0.01])
+        toward = 1e3 * ref64.sun_direction(low) + np.array([0, 0, 0.01])
         camera = camera or nubis.Camera.look_at((0, 0, 0.01), toward, (0, 0, 1), 2.0)
         return ours.sun_visibility(camera, low, scene_depth=scene_depth).direct
 

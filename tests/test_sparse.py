@@ -1,12 +1,12 @@
 """Where one pixel in sixteen is marched and nothing else, as in "preview", the clouds are known at
-the corners of cells of four by four pixels, in frames as in stills (shaders/wgsl/lattice.wgsl).
+the corners of cells of four by four pixels, in frames as in stills (shaders/wgsl/sample_grid.wgsl).
 """
 
 import numpy as np
 import pytest
 
 import nubis
-import twin
+import ref64
 from nubis import Camera
 
 SIZE = 240, 136
@@ -73,7 +73,7 @@ def test_what_is_between_is_put_where_it_belongs():
             nubis.Renderer(*SIZE, quality=quality).render_layers(camera, params)
             for quality in (PREVIEW, EVERY)
         )
-        assert twin.relative_rmse(got["radiance"], rays["radiance"]) < 0.25
+        assert ref64.relative_rmse(got["radiance"], rays["radiance"]) < 0.25
         assert got["radiance"].mean() == pytest.approx(rays["radiance"].mean(), rel=0.01)
         np.testing.assert_allclose(got["sky"], rays["sky"], rtol=0.05, atol=1e-3)
         thick = (got["transmittance"] < 0.1) & (rays["transmittance"] < 0.1)
@@ -127,7 +127,7 @@ def test_what_stops_becomes_the_still():
     make = nubis.Renderer(*SIZE, quality=PREVIEW)
     *_, last = make.animate(moving + moving[-1:] * 8)
     still = make.render(*moving[-1][:2], time=moving[-1][2])
-    assert twin.relative_rmse(last, still) < 1e-3
+    assert ref64.relative_rmse(last, still) < 1e-3
 
 
 def test_clouds_go_where_they_are_seen_next():
@@ -144,7 +144,7 @@ def test_clouds_go_where_they_are_seen_next():
     still = make.render(*turn[-1][:2])
     known = make.history_length == 16
     assert known.mean() > 0.8
-    assert twin.relative_rmse(last[known], still[known]) < 0.08  # 0.050; by whole pixels, 0.15
+    assert ref64.relative_rmse(last[known], still[known]) < 0.08  # 0.050; by whole pixels, 0.15
 
 
 @pytest.mark.slow_after(1)
@@ -157,7 +157,7 @@ def test_a_flight_is_near_its_stills(scene):
     other = nubis.Renderer(*SIZE, quality=PREVIEW)
     for i, frame in enumerate(make.animate(flight)):
         still = other.render(*flight[i][:2], time=flight[i][2])
-        assert twin.relative_rmse(frame[..., :3], still[..., :3]) < 0.06
+        assert ref64.relative_rmse(frame[..., :3], still[..., :3]) < 0.06
     assert make.history_length.shape == SIZE[::-1]
 
 
@@ -213,7 +213,7 @@ def test_other_projections(kind):
     *_, last = make.animate(flight)
     still = make.render(*flight[-1][:2], time=flight[-1][2])
     assert make.history_length is not None
-    assert twin.relative_rmse(last, still) < 0.1
+    assert ref64.relative_rmse(last, still) < 0.1
 
 
 @pytest.mark.slow
@@ -227,10 +227,10 @@ def test_small_and_narrow_pictures(size):
     )
     still = make.render(*shot[:2])
     every = nubis.Renderer(*size, quality=EVERY).render(*shot[:2])
-    assert twin.relative_rmse(still, every) < 0.3
+    assert ref64.relative_rmse(still, every) < 0.3
     frames = list(make.animate([shot] * 3 + [other] * 3))
     assert all(frame.tobytes() == still.tobytes() for frame in frames[:3])
-    assert twin.relative_rmse(frames[-1], make.render(*other[:2])) < 0.1
+    assert ref64.relative_rmse(frames[-1], make.render(*other[:2])) < 0.1
 
 
 @pytest.mark.slow_after(1)
@@ -242,7 +242,7 @@ def test_from_above_the_high_clouds(altitude):
     got, rays = (
         nubis.Renderer(*SIZE, quality=quality).render(camera, SKY) for quality in (PREVIEW, EVERY)
     )
-    assert twin.relative_rmse(got, rays) < 0.21
+    assert ref64.relative_rmse(got, rays) < 0.21
     assert got.mean() == pytest.approx(rays.mean(), rel=0.01)
 
 

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 import nubis
 import strategies
-import twin
+import ref64
 from nubis import Camera, ParameterError, Params
 from strategies import DRAFT
 from test_params import CLASSES, IMAGES, allowed, filled, kind
@@ -75,7 +75,7 @@ def phase_peak(light):
     less than of the fit's forward lobe.
     """
     if light.phase != "henyey_greenstein":
-        g = twin.droplet_lobes(light.droplet_diameter)[0]
+        g = ref64.droplet_lobes(light.droplet_diameter)[0]
         return (1 + g) / (4 * np.pi * (1 - g) ** 2)
     return max((1 + abs(g)) / (4 * np.pi * (1 - abs(g)) ** 2) for g in (light.g, light.g_back))
 
@@ -182,9 +182,9 @@ def test_no_sun_through_the_ground(distance, azimuth, elevation, radius):
         **{"sun.elevation": elevation, "sun.azimuth": 30.0, "atmosphere.planet_radius": radius}
     )
     # The first point says where the others are measured from.
-    there = distance * twin.compass(azimuth)[None]
+    there = distance * ref64.compass(azimuth)[None]
     assume(math.degrees(distance / radius) < -elevation - 0.01)
-    points = np.concatenate([[[0.0, 0, 0]], twin.raised(there, radius, 0.0)])
+    points = np.concatenate([[[0.0, 0, 0]], ref64.raised(there, radius, 0.0)])
     sunlight = renderer((1, 1), DRAFT).sun_transmittance(points, params)
     np.testing.assert_array_equal(sunlight, 0)
 
@@ -227,7 +227,7 @@ def test_the_wind_comes_round(data, turns, exponent):
 
 
 def look_up_at_clouds():
-    return strategies.look((0, 0, 256), twin.compass(20, 25))
+    return strategies.look((0, 0, 256), ref64.compass(20, 25))
 
 
 # Fields in which a sky may not change continuously: they count whole cells of a tile.
@@ -319,7 +319,7 @@ def test_a_little_change_changes_little(data):
         eye = np.array(eye) + 1e-3 * data.draw(strategies.directions(params, eye))
     elif which == "direction":
         off = np.cross(direction, data.draw(strategies.directions(params, eye)))
-        direction = twin.normalized(direction + 1e-7 * off)
+        direction = ref64.normalized(direction + 1e-7 * off)
     elif which == "time":
         time += 1e-6
     else:
@@ -359,7 +359,7 @@ def test_a_climb_has_no_jumps(data):
     )
     height = data.draw(st.one_of(st.floats(0, 20_000), shell))
     assume(height >= 0)
-    direction = twin.compass(20, data.draw(st.sampled_from([-90, -10, -1, 0, 1, 10, 90])))
+    direction = ref64.compass(20, data.draw(st.sampled_from([-90, -10, -1, 0, 1, 10, 90])))
     make = renderer((8, 6), DRAFT.replace(jitter=False))
     frames = [
         make.render(strategies.look((0, 0, height + 0.01 * i), direction), params) for i in range(4)
@@ -400,7 +400,7 @@ def test_any_animation(data):
         elif move == "turn" and camera.kind == "perspective":
             off = np.cross(camera.forward, data.draw(strategies.directions(params, camera.eye)))
             direction = np.array(camera.forward) + data.draw(st.sampled_from([1e-6, 0.1])) * off
-            camera = strategies.look(camera.eye, twin.normalized(direction), camera.fov)
+            camera = strategies.look(camera.eye, ref64.normalized(direction), camera.fov)
         elif move == "sky":
             params = data.draw(strategies.params())
         elif move == "parameter":
@@ -593,7 +593,7 @@ def test_an_invisible_cloud_stays_where_it_is(eye):
     grid = nubis.DensityGrid(np.full((2, 2, 2), 1e-12, np.float32), (low, low + 10_000))
     changes = {"atmosphere.planet_radius": 10_000.0, "light.model": "single"}
     params = Params().with_(**changes).replace(volume=grid)
-    camera, make = strategies.look(eye, twin.compass(30, 40)), renderer((8, 6), DRAFT)
+    camera, make = strategies.look(eye, ref64.compass(30, 40)), renderer((8, 6), DRAFT)
     layers = make.render_layers(camera, params)
     assert (layers["radiance"] > 0).any()
     still = make.render(camera, params)
@@ -652,7 +652,7 @@ def test_the_thinnest_clouds():
 
 
 def test_the_ground_does_not_vanish_under_it():
-    camera = [strategies.look((0, 0, z), twin.compass(20, -20)) for z in (0.001, 0, -0.001, -100)]
+    camera = [strategies.look((0, 0, z), ref64.compass(20, -20)) for z in (0.001, 0, -0.001, -100)]
     clear = Params().with_(**{"clouds.coverage": 0.0, "high_clouds.coverage": 0.0})
     frames = [renderer((8, 6), DRAFT).render(c, clear) for c in camera]
     for frame in frames[1:]:
@@ -661,7 +661,7 @@ def test_the_ground_does_not_vanish_under_it():
 
 def test_a_narrow_static_shot_becomes_the_still():
     """Its pixels are as small as the rounding of their directions."""
-    camera = strategies.look((0, 0, 1), twin.compass(20, 40), 0.001)
+    camera = strategies.look((0, 0, 1), ref64.compass(20, 40), 0.001)
     make = renderer((8, 6), DRAFT)
     *_, last = make.animate([(camera, Params(), 0.0)] * 17)
     assert last.tobytes() == make.render(camera, Params()).tobytes()
@@ -704,10 +704,10 @@ def test_the_largest_method_runs_to_its_end():
     """As many iterations as a method may have: lavapipe stops at 65,535 without a word."""
     params = Params().with_(**BLACK_AIR, **FULL, **{"light.model": "single"})
     params = params.with_(**{"clouds.extinction": 1e-4})
-    camera = strategies.look((0, 0, 256), twin.compass(20, 25), 5.0)
+    camera = strategies.look((0, 0, 256), ref64.compass(20, 25), 5.0)
     pictures = []
     for steps, light in ((512, 2), (4000, 2), (1800, 8)):
-        quality = twin.fine(steps, light, step_growth=1.0)
+        quality = ref64.fine(steps, light, step_growth=1.0)
         pictures.append(renderer((8, 1), quality).render_layers(camera, params))
         assert pictures[-1]["samples"].min() > steps
     for picture in pictures[1:]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import nubis
-import twin
+import ref64
 from nubis.testing import probe
 
 # A narrow view: the level of detail is the finest, which is the one that `density` reads.
@@ -22,7 +22,7 @@ def lit(**changes):
         "sun.irradiance": (3.0, 2.0, 1.0),
         "clouds.extinction": 0.004,
     }
-    return twin.smooth_params(**(values | changes))
+    return ref64.smooth_params(**(values | changes))
 
 
 def paths(samples, scatterings=4096):
@@ -32,14 +32,14 @@ def paths(samples, scatterings=4096):
 def test_the_reference_against_a_plain_marcher(renderer):
     """In float64, through the renderer's own density, with shell and shadows of its own."""
     params = lit()
-    directions = twin.pixel_directions(CAMERA, 8, 4).reshape(-1, 3)
-    time = twin.cloudy_time(renderer(), params, CAMERA, 0.05, 0.8)
+    directions = ref64.pixel_directions(CAMERA, 8, 4).reshape(-1, 3)
+    time = ref64.cloudy_time(renderer(), params, CAMERA, 0.05, 0.8)
     layers = renderer(8, 4, "reference").render_layers(CAMERA, params, time=time)
-    light = twin.single_scattering(renderer(), params, CAMERA.eye, directions, 800, 400, time)
+    light = ref64.single_scattering(renderer(), params, CAMERA.eye, directions, 800, 400, time)
     np.testing.assert_allclose(
         layers["radiance"].reshape(-1, 3), light, rtol=2e-3, atol=1e-3 * light.mean()
     )
-    clear = twin.transmittance(renderer(), params, CAMERA.eye, directions, 8000, time)
+    clear = ref64.transmittance(renderer(), params, CAMERA.eye, directions, 8000, time)
     np.testing.assert_allclose(layers["transmittance"].ravel(), clear, atol=2e-4)
 
 
@@ -49,7 +49,7 @@ def test_more_evaluations_than_a_dispatch_may_make(renderer):
     """
     params = lit()
     strict = nubis.quality("reference").replace(tolerance=1e-6)
-    time = twin.cloudy_time(renderer(), params, CAMERA, 0.05, 0.8)
+    time = ref64.cloudy_time(renderer(), params, CAMERA, 0.05, 0.8)
     fine, usual = (
         renderer(8, 4, q).render_layers(CAMERA, params, time=time) for q in (strict, "reference")
     )
@@ -66,10 +66,10 @@ def test_more_evaluations_than_a_dispatch_may_make(renderer):
 def test_methods_converge_to_the_reference(renderer, model):
     """Every light model: many equal steps and light samples come to the same picture."""
     params = lit(**{"light.model": model, "light.ambient": (0.2, 0.2, 0.2)})
-    time = twin.cloudy_time(renderer(), params, CAMERA, 0.05, 0.8)
+    time = ref64.cloudy_time(renderer(), params, CAMERA, 0.05, 0.8)
     got, want = (
         renderer(8, 4, q).render_layers(CAMERA, params, time=time)
-        for q in (twin.fine(220, 128, light_distance=0.0), "reference")
+        for q in (ref64.fine(220, 128, light_distance=0.0), "reference")
     )
     np.testing.assert_allclose(got["radiance"], want["radiance"], rtol=5e-3, atol=1e-4)
     assert want["change"].shape == want["radiance"].shape and "change" not in got
@@ -98,7 +98,7 @@ def test_majorants_are_never_exceeded(rng, scene, clear):
     assert len(points) > 1000
     reach = ask(f"vec4f({near}.reach)", points[:1])[0, 0]
     assert reach > 20
-    way = twin.normalized(rng.normal(size=points.shape))
+    way = ref64.normalized(rng.normal(size=points.shape))
     start = points + way * reach * rng.uniform(0, 0.999, (len(points), 1))
     bound = ask(f"vec4f({near}.density)", start)[:, 0]
     inside = (start[:, 2] > clouds.base + 50) & (start[:, 2] < top - 50)
@@ -124,7 +124,7 @@ def test_majorants_of_a_grid(rng):
     bound = ask(f"vec4f({near}.density, {near}.reach, 0.0, 0.0)", points)
     reach = bound[0, 1]
     assert reach == pytest.approx(4 * 50, rel=1e-5)
-    way = twin.normalized(rng.normal(size=points.shape))
+    way = ref64.normalized(rng.normal(size=points.shape))
     end = np.clip(points + way * reach * rng.uniform(0, 0.999, (len(points), 1)), low, high)
     density = ask("vec4f(volume_density(x.xyz))", end)[:, 0]
     assert (density > 0.3).sum() > 50
@@ -139,7 +139,7 @@ def test_majorants_of_a_grid(rng):
 def test_paths_of_one_scattering(renderer, g):
     """They are the reference's single scattering, by Z-score of the tiles' means."""
     camera, params = CAMERA, lit(**{"light.g": g})
-    time = twin.cloudy_time(renderer(), params, camera, 0.05, 0.8)
+    time = ref64.cloudy_time(renderer(), params, camera, 0.05, 0.8)
     want = renderer(32, 16, "reference").render_layers(camera, params, time=time)
     traced = params.with_(**{"light.model": "path"})
     got = renderer(32, 16, paths(256, 1)).render_layers(camera, traced, time=time)
@@ -161,7 +161,7 @@ def test_paths_of_one_scattering(renderer, g):
 
 def test_more_orders_are_more_light(renderer):
     params = lit(**{"light.model": "path", "light.albedo": 1.0})
-    time = twin.cloudy_time(renderer(), params, CAMERA, 0.05, 0.8)
+    time = ref64.cloudy_time(renderer(), params, CAMERA, 0.05, 0.8)
     light = [
         renderer(16, 8, paths(64, n)).render_layers(CAMERA, params, time=time)["radiance"].mean()
         for n in (1, 2, 8, 4096)
@@ -176,7 +176,7 @@ def test_a_static_shot_goes_on_tracing(renderer):
     """
     params = lit(**{"light.model": "path"})
     make = renderer(32, 16, paths(32))
-    time = twin.cloudy_time(renderer(), params, CAMERA, 0.05, 0.8)
+    time = ref64.cloudy_time(renderer(), params, CAMERA, 0.05, 0.8)
     layers = make.render_layers(CAMERA, params, time=time)
     frames = list(make.animate([(CAMERA, params, time)] * 4, background=None))
     np.testing.assert_array_equal(frames[0][..., :3], layers["radiance"])

@@ -1,4 +1,4 @@
-"""Noises, baked textures and the whole cloud field against `noise_twin`: what the formulas say, in
+"""Noises, baked textures and the whole cloud field against `ref64_noise`: what the formulas say, in
 float64.
 """
 
@@ -7,9 +7,9 @@ import itertools
 import numpy as np
 import pytest
 
-import noise_twin
+import ref64_noise
 import nubis
-import twin
+import ref64
 from nubis.testing import probe
 
 NOISES = ["nubis2015", "vsu2022"]
@@ -34,14 +34,14 @@ def test_hashes_to_the_bit(rng):
         f32(dot({hashed} >> vec3u(24u), vec3u(1u, 256u, 65536u))))"""
     got = probe(wgsl, inputs, imports=["random"]).astype(np.int64)
     got = got[:, :3] + (got[:, 3:] // top % 2**8 << 24)
-    np.testing.assert_array_equal(got, noise_twin.pcg3d(whole))
+    np.testing.assert_array_equal(got, ref64_noise.pcg3d(whole))
 
 
 @pytest.mark.parametrize("salt", [0, 1, 131 * SEED % 2**32, 2**32 - 1])
 def test_random_numbers_to_the_bit(rng, salt):
     cells = rng.integers(0, 2**24, (5000, 3))
     got = probe(f"vec4f(random3(vec3u(x.xyz), {salt}u), 0.0)", cells, imports=["random"])[:, :3]
-    np.testing.assert_array_equal(got, noise_twin.random3(cells, salt))
+    np.testing.assert_array_equal(got, ref64_noise.random3(cells, salt))
 
 
 @pytest.mark.parametrize("period", [(1, 3, 8), (2, 111, 1)])
@@ -63,16 +63,16 @@ def test_noises_at_points(rng, period, salt):
     the period). Worley noise has a slope of 1 a cell, Perlin noise under 4, and in its FBM every
     octave has the same; the sums of 8 corners are good to 1e-6.
     """
-    p = noise_twin.f32(rng.uniform(-2, 3, (4000, 3)))
+    p = ref64_noise.f32(rng.uniform(-2, 3, (4000, 3)))
     functions = [f"perlin({{}}, {period}u, {salt}u)", f"worley({{}}, {period}u, {salt}u)"]
     functions += [f"perlin_fbm({{}}, {period}u, {n}u, {salt}u)" for n in (1, 4)]
     wgsl = f"vec4f({', '.join(functions)})".format(*["x.xyz"] * 4)
     got = probe(wgsl, p, imports=["gradient_noise"])
     expected = [
-        noise_twin.perlin(p, period, salt),
-        noise_twin.worley(p, period, salt),
-        noise_twin.perlin_fbm(p, period, 1, salt),
-        noise_twin.perlin_fbm(p, period, 4, salt),
+        ref64_noise.perlin(p, period, salt),
+        ref64_noise.worley(p, period, salt),
+        ref64_noise.perlin_fbm(p, period, 1, salt),
+        ref64_noise.perlin_fbm(p, period, 4, salt),
     ]
     slopes = np.array([4, 1, 4 * 0.85, 4 * 4 * 0.85 / 1.875])
     error = np.abs(got.T - expected).max(axis=1)
@@ -84,12 +84,12 @@ def test_noises_at_points(rng, period, salt):
 @pytest.mark.parametrize("period", [1, 2, 3, 7, 48])
 def test_simplex_noise(rng, period, salt):
     """Over several tiles, so that it must tile as well; its slope is under 4 a triangle."""
-    p = noise_twin.f32(rng.uniform(-2, 3, (4000, 2)))
+    p = ref64_noise.f32(rng.uniform(-2, 3, (4000, 2)))
     wgsl = f"simplex(x.xy, {period}u, {salt}u), simplex_fbm(x.xy, {period}u, 4u, {salt}u)"
     got = probe(f"vec4f({wgsl}, 0.0, 0.0)", p, imports=["gradient_noise"])
     expected = [
-        noise_twin.simplex(p, period, salt),
-        noise_twin.simplex_fbm(p, period, 4, salt),
+        ref64_noise.simplex(p, period, salt),
+        ref64_noise.simplex_fbm(p, period, 4, salt),
     ]
     slopes = np.array([4, 4 * 4 * 0.85 / 1.875])
     error = np.abs(got.T[:2] - expected).max(axis=1)
@@ -99,25 +99,25 @@ def test_simplex_noise(rng, period, salt):
 def test_simplex_noise_is_like_perlin_noise(rng):
     """As wide, so that one can stand for the other; about 0, and smooth from tile to tile."""
     p = rng.uniform(0, 1, (100_000, 3))
-    simplex = noise_twin.simplex(p[:, :2], 48, 5)
+    simplex = ref64_noise.simplex(p[:, :2], 48, 5)
     assert abs(simplex.mean()) < 5e-3
-    assert simplex.std() == pytest.approx(noise_twin.perlin(p, 48, 5).std(), rel=0.05)
+    assert simplex.std() == pytest.approx(ref64_noise.perlin(p, 48, 5).std(), rel=0.05)
     edge, e = np.zeros((1000, 2)), 1e-6
     edge[:, 1] = rng.uniform(0, 1, 1000)
     for side in (edge, edge[:, ::-1]):
         across = (side == 0) * e
-        step = noise_twin.simplex(1 + side - across, 5, 9) - noise_twin.simplex(across + side, 5, 9)
+        step = ref64_noise.simplex(1 + side - across, 5, 9) - ref64_noise.simplex(across + side, 5, 9)
         assert np.abs(step).max() < 1e-4
 
 
 def test_perlin_worley(rng):
     inputs = np.concatenate([rng.uniform(0, 1, (3000, 2)), [(0, 0), (1, 0), (0, 1), (1, 1)]])
     got = probe("perlin_worley(x.x, x.y)", inputs, imports=["gradient_noise"])[:, 0]
-    perlin, worley = noise_twin.f32(inputs).T
+    perlin, worley = ref64_noise.f32(inputs).T
     # The new range is as wide as the Worley noise is bright: dividing by it enlarges the rounding
     # of 1 - worley.
     tolerance = 2e-7 / np.maximum(worley, 1e-4)
-    error = np.abs(got - noise_twin.perlin_worley(perlin, worley))
+    error = np.abs(got - ref64_noise.perlin_worley(perlin, worley))
     assert (error <= tolerance + 1e-6).all()
 
 
@@ -138,8 +138,8 @@ def noise_params(request):
 
 @pytest.mark.slow_after(1)
 def test_base_shape(rng, noise_params):
-    at = rng.integers(0, noise_twin.SHAPE_SIZE, (3000, 3))
-    expected = noise_twin.bakes(noise_params)["shape_noise"](at)
+    at = rng.integers(0, ref64_noise.SHAPE_SIZE, (3000, 3))
+    expected = ref64_noise.bakes(noise_params)["shape_noise"](at)
     got = texels("shape_noise", at, noise_params)[:, :1]
     np.testing.assert_allclose(got, expected, atol=STEP + 1e-5)
     # It varies, or it could be anything.
@@ -152,17 +152,17 @@ def test_base_shape(rng, noise_params):
 def test_detail(rng, noise_params, share, level):
     """It lies in one texture with the detail, as far as both together stay within 0 to 1."""
     params = noise_params.with_(**{"clouds.fine_detail": share})
-    bake, size = noise_twin.detail_bake(params.clouds), noise_twin.FINER_SIZE
+    bake, size = ref64_noise.detail_bake(params.clouds), ref64_noise.FINER_SIZE
     at = rng.integers(0, size >> level, (1500 >> 3 * level, 3))
-    expected = noise_twin.mip(bake, at, level)
+    expected = ref64_noise.mip(bake, at, level)
     got = texels("detail_noise", at, params, level)[:, :1]
     np.testing.assert_allclose(got, expected, atol=(level + 3) * STEP)
     assert expected.std() > 0.03
 
 
 def test_curl_noise(rng, noise_params):
-    at = rng.integers(0, noise_twin.CURL_SIZE, (3000, 2))
-    expected = noise_twin.curl_texels(at, noise_params.clouds)
+    at = rng.integers(0, ref64_noise.CURL_SIZE, (3000, 2))
+    expected = ref64_noise.curl_texels(at, noise_params.clouds)
     got = texels("curl_noise", at, noise_params)[:, :2]
     assert expected.std(axis=0).min() > 0.1
     # A little passes 1, where the step is twice as large.
@@ -193,8 +193,8 @@ def test_curl_noise(rng, noise_params):
 )
 def test_weather_map(rng, weather):
     params = nubis.Params().with_(**{f"weather.{name}": value for name, value in weather.items()})
-    at = rng.integers(0, [7, 5] if "map" in weather else noise_twin.WEATHER_SIZE, (3000, 2))
-    expected = noise_twin.weather_texels(at, params.weather)
+    at = rng.integers(0, [7, 5] if "map" in weather else ref64_noise.WEATHER_SIZE, (3000, 2))
+    expected = ref64_noise.weather_texels(at, params.weather)
     got = texels("weather_map", at, params)[:, :3]
     assert expected.std(axis=0).min() > 0.03
     np.testing.assert_allclose(got, expected, atol=STEP + 1e-5)
@@ -216,7 +216,7 @@ def test_weather_map(rng, weather):
 def test_high_cloud_map(rng, time, high):
     params = nubis.Params().with_(**{f"high_clouds.{name}": value for name, value in high.items()})
     at = rng.integers(0, params.high_clouds.texture_size, (3000, 2))
-    expected = noise_twin.high_texels(at, params.high_clouds, time)
+    expected = ref64_noise.high_texels(at, params.high_clouds, time)
     got = texels("high_map", at, params, time=time)[:, :1]
     assert expected.std() > 0.05
     # The swirl moves points off the centres of texels, where f32 has 2^-24 of a tile: 1e-4 of the
@@ -229,11 +229,11 @@ def test_high_cloud_map(rng, time, high):
 def test_weather_of_a_texel(rng, clouds):
     names = ["clouds.coverage", "clouds.type", "clouds.precipitation"]
     params = nubis.Params().with_(**dict(zip(names, clouds, strict=True)))
-    texel = noise_twin.f32(rng.uniform(0, 1, (2000, 3)))
+    texel = ref64_noise.f32(rng.uniform(0, 1, (2000, 3)))
     fields = ("coverage", "kind", "precipitation")
     wgsl = ", ".join(f"weather_from_map(x.xyz).{field}" for field in fields)
     got = probe(f"vec4f({wgsl}, 0.0)", texel, imports=["density"], params=params)
-    expected = noise_twin.weather_from_map(texel, params.clouds)
+    expected = ref64_noise.weather_from_map(texel, params.clouds)
     np.testing.assert_allclose(got[:, :3].T, expected, atol=1e-6)
 
 
@@ -291,7 +291,7 @@ def points_about_the_shell(rng, params, n):
     """Three in four inside, the others around its base and its top, from metres to kilometres
     away; the first at the edge of it all, since positions go to the GPU relative to it.
     """
-    base, top = twin.shell(params)
+    base, top = ref64.shell(params)
     heights = rng.uniform(base, top, n)
     edge = slice(0, None, 4)
     away = rng.choice([-1, 1], n) * 10 ** rng.uniform(0, 3, n)
@@ -299,7 +299,7 @@ def points_about_the_shell(rng, params, n):
     level = np.zeros((n, 3))
     level[:, :2] = rng.uniform(-60_000, 60_000, (n, 2))
     level[0, :2] = 60_000
-    return twin.raised(level, params.atmosphere.planet_radius, heights), heights
+    return ref64.raised(level, params.atmosphere.planet_radius, heights), heights
 
 
 def added(rng, kind):
@@ -350,7 +350,7 @@ def added(rng, kind):
     ],
 )
 def test_extinction(renderer, noise_params, seed, time, kind, edge):
-    """The whole field, twice: with the twin's own texels, and with those on the GPU.
+    """The whole field, twice: with the ref64's own texels, and with those on the GPU.
 
     Errors are shares of the extinction at density 1.
 
@@ -368,7 +368,7 @@ def test_extinction(renderer, noise_params, seed, time, kind, edge):
     params = any_sky(rng, noise_params).with_(**{"weather.edge": edge})
     params = params.with_(**added(rng, kind))
     points, heights = points_about_the_shell(rng, params, 1000)
-    # The twin follows each swing: ten thousand at most.
+    # The ref64 follows each swing: ten thousand at most.
     period = max(params.wander.period, abs(time) / 1e4)
     params = params.with_(**{"wander.period": period})
     deck = params.upper_clouds
@@ -378,16 +378,16 @@ def test_extinction(renderer, noise_params, seed, time, kind, edge):
         deck.extinction if deck.coverage > 0 else 0.0,
     )
     got = renderer().density(points, params, time=time) / largest
-    base, top = twin.shell(params)
+    base, top = ref64.shell(params)
     inside = (heights > base) & (heights < top)
     assert (got[inside] > 0).mean() > 0.02 and (got[~inside] == 0).all()
 
-    bakes = noise_twin.bakes(params)
+    bakes = ref64_noise.bakes(params)
     on_gpu = {name: lambda at, name=name: texels(name, at, params, time=time) for name in bakes}
     bent = params.weather.broad_variety > 0 and params.weather.map is None
     own = (bakes, 5e-2, 3e-3) if bent else (bakes, 5e-3, 4e-4)
     for textures, worst, typical in ((on_gpu, 1e-2, 4e-4), own):
-        expected = noise_twin.Field(params, time, textures).extinction(points)
+        expected = ref64_noise.Field(params, time, textures).extinction(points)
         error = got - expected / largest
         assert np.abs(error).max() < worst
         assert np.sqrt(np.mean(error**2)) < typical

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import nubis
-import twin
+import ref64
 
 # Means over bins of 10 nm from 360 nm on. ASTM G173-03, extraterrestrial, W/(m2 nm), as averaged by
 # E. Bruneton (precomputed_atmospheric_scattering, 2017).
@@ -79,7 +79,7 @@ def test_a_cloud_of_known_luminance(renderer):
     """
     low, high = (-500.0, -500.0, 3000.0), (500.0, 500.0, 4000.0)
     grid = nubis.DensityGrid(np.full((2, 2, 2), 1e-5, np.float32), (low, high))
-    params = twin.smooth_params(
+    params = ref64.smooth_params(
         **{
             "light.model": "single",
             "light.g": 0.0,

@@ -9,9 +9,9 @@ import zlib
 import numpy as np
 import pytest
 
-import noise_twin
+import ref64_noise
 import nubis
-import twin
+import ref64
 from nubis import FileError, ParameterError, Params, Weather, WeatherBlend
 from nubis.testing import probe
 
@@ -187,7 +187,7 @@ def test_majorants_beyond_the_edge(rng, edge, size):
     points, density = points[density > 0], density[density > 0]
     assert len(points) > 1000
     reach = ask(f"vec4f({reach_of}.reach)", points[:1])[0, 0]
-    way = twin.normalized(rng.normal(size=points.shape))
+    way = ref64.normalized(rng.normal(size=points.shape))
     start = points + way * reach * rng.uniform(0, 0.999, (len(points), 1))
     bound = ask(f"vec4f({reach_of}.density)", start)[:, 0]
     inside = (start[:, 2] > clouds.base + 50) & (start[:, 2] < clouds.top - 50)
@@ -205,7 +205,7 @@ def test_paths_beyond_the_edge(renderer, edge):
     map[..., 1] = 0.6
     map[:, 90:, 0] = 0.9  # cloud in the east,
     map[:, :26, 0] = 0.6  # and some in the west
-    params = twin.smooth_params(
+    params = ref64.smooth_params(
         **{
             "weather.map": map,
             "weather.edge": edge,
@@ -359,7 +359,7 @@ class TestMixtures:
             (Weather(map=map), w) for map, w in zip(others, weights[1:].tolist(), strict=True)
         )
         got = renderer().weather_map(Params(weather=Weather(map=base), weather_mix=mix))
-        want = np.tensordot(weights, noise_twin.half([base, *others]), 1)
+        want = np.tensordot(weights, ref64_noise.half([base, *others]), 1)
         # A step each time that four are mixed, and that of filter weights at the texels' centres.
         np.testing.assert_allclose(got, want, atol=(1 + count // 3) * STEP + 1e-4)
 
@@ -380,8 +380,8 @@ class TestMixtures:
         at = np.stack(np.meshgrid((np.arange(18) + 0.5) / 18, (np.arange(20) + 0.5) / 20), -1)
         for edge in EDGES:
             fields = [
-                noise_twin.sample(
-                    lambda t, m=m: noise_twin.half(m[t[..., 1], t[..., 0]]),
+                ref64_noise.sample(
+                    lambda t, m=m: ref64_noise.half(m[t[..., 1], t[..., 0]]),
                     m.shape[1::-1],
                     at.reshape(-1, 2),
                     edge,

@@ -1,17 +1,17 @@
 """Winds: each its own direction and speed, at any time as exact as at the first second, and in
-their wandering the integral of what `noise_twin` says their velocity is.
+their wandering the integral of what `ref64_noise` says their velocity is.
 """
 
 import numpy as np
 import pytest
 
-import noise_twin
+import ref64_noise
 import nubis
-import twin
+import ref64
 from nubis.testing import probe
 
 MONTH = 2.6e6  # s
-# A whole number of every tile, m: the twin of a point may be any number of these away.
+# A whole number of every tile, m: the ref64 of a point may be any number of these away.
 TILE = 60_000.0
 WANDER = {"wander.wind": 0.6, "wander.coverage": 0.0, "wander.seed": 5}
 
@@ -39,13 +39,13 @@ def points_of(rng, params, n, reach, low=0.0, high=1.0):
     points = np.zeros((n, 3))
     points[:, :2] = rng.uniform(-reach, reach, (n, 2))
     altitude = base + rng.uniform(low, high, n) * (top - base)
-    return twin.raised(points, params.atmosphere.planet_radius, altitude), altitude
+    return ref64.raised(points, params.atmosphere.planet_radius, altitude), altitude
 
 
 def moved(points, way, altitude, params):
     """The points moved by a way on the chart, at the same altitude."""
     radius = params.atmosphere.planet_radius
-    return twin.from_chart(twin.on_chart(points, radius) + np.asarray(way), radius, altitude)
+    return ref64.from_chart(ref64.on_chart(points, radius) + np.asarray(way), radius, altitude)
 
 
 def rms(values):
@@ -67,10 +67,10 @@ def test_the_field_moves_by_the_wind(renderer, rng, time, wander):
     """
     params = alike(72.0, 15.0, **wander)
     points, altitude = points_of(rng, params, 4000, 15_000)
-    way = noise_twin.blown(params, 72.0, 15.0, time)
+    way = ref64_noise.blown(params, 72.0, 15.0, time)
     if wander:
         # It is another way, or this tests nothing new.
-        assert np.linalg.norm(way - noise_twin.blown(alike(72.0, 15.0), 72.0, 15.0, time)) > 1
+        assert np.linalg.norm(way - ref64_noise.blown(alike(72.0, 15.0), 72.0, 15.0, time)) > 1
     now = renderer().density(points, params, time=time)
     then = renderer().density(moved(points, -np.fmod(way, TILE), altitude, params), params)
     beside = renderer().density(moved(points, [0.5, 0.0], altitude, params), params, time=time)
@@ -96,10 +96,10 @@ def test_where_each_tile_stands(time, wander):
 
     def way(wind, kind=""):
         direction, speed = (getattr(wind, kind + name) for name in ("direction", "speed"))
-        return noise_twin.blown(params, direction, speed, time)
+        return ref64_noise.blown(params, direction, speed, time)
 
-    rise = time * noise_twin.f32(params.wind.updraft)
-    along = twin.compass(high.direction)[:2]
+    rise = time * ref64_noise.f32(params.wind.updraft)
+    along = ref64.compass(high.direction)[:2]
     at_high = way(high) @ np.column_stack([along, [-along[1], along[0]]])
     # The middle of the map is the origin, and its rows run south.
     weather = way(params.wind, "weather_") * [1, -1] - 0.5 * params.weather.extent
@@ -115,8 +115,8 @@ def test_where_each_tile_stands(time, wander):
         n = len(metres)
         wgsl = f"vec4f(frame.sky.{name}, {', '.join(['0.0'] * (4 - n))})"
         got = probe(wgsl, [0.0], imports=["bindings"], params=params, time=time)[0, :n]
-        apart = np.mod(got + metres / noise_twin.f32(tile) + 0.5, 1) - 0.5
-        # Rounding to f32, and what the twin's own sums and sines lose of the way.
+        apart = np.mod(got + metres / ref64_noise.f32(tile) + 0.5, 1) - 0.5
+        # Rounding to f32, and what the ref64's own sums and sines lose of the way.
         assert (np.abs(apart) * tile < 2.0**-24 * tile + 1e-6).all(), name
 
 
@@ -128,7 +128,7 @@ def columns(params, across, rows, spacing):
     height = (np.arange(rows) + 0.5) / rows
     altitude = params.clouds.base + height * (params.clouds.top - params.clouds.base)
     radius = params.atmosphere.planet_radius
-    return np.stack([twin.raised(level, radius, a) for a in altitude], axis=1).reshape(-1, 3)
+    return np.stack([ref64.raised(level, radius, a) for a in altitude], axis=1).reshape(-1, 3)
 
 
 def test_still_weather_keeps_a_sky_in_place(renderer):
@@ -168,9 +168,9 @@ def test_tops_lean_by_the_shear(renderer, rng, shear):
     points, altitude = points_of(rng, upright, 4000, 10_000)
     clouds = upright.clouds
     height = (altitude - clouds.base) / (clouds.top - clouds.base)
-    lean = np.column_stack([*(twin.compass(30.0)[:2, None] * shear * height), np.zeros(4000)])
+    lean = np.column_stack([*(ref64.compass(30.0)[:2, None] * shear * height), np.zeros(4000)])
     expected = renderer().density(points, upright)
-    there = twin.raised(points + lean, upright.atmosphere.planet_radius, altitude)
+    there = ref64.raised(points + lean, upright.atmosphere.planet_radius, altitude)
     got = renderer().density(there, leaning)
     assert (expected > 0).mean() > 0.05
     assert rms(got - expected) < 0.005 * expected.std()
@@ -199,7 +199,7 @@ def test_the_updraft_raises_the_noises(renderer, rng, updraft):
     points, altitude = points_of(rng, params, 3000, 8000, 0.20, 0.28)
     time = 1000.0 / abs(updraft)  # s: a kilometre
     radius = params.atmosphere.planet_radius
-    above = twin.from_chart(twin.on_chart(points, radius), radius, altitude + updraft * time)
+    above = ref64.from_chart(ref64.on_chart(points, radius), radius, altitude + updraft * time)
     before = renderer().density(points, params)
     after = renderer().density(above, params, time=time)
     assert (before > 0).mean() > 0.05
@@ -231,7 +231,7 @@ def test_the_detail_drifts_its_own_way(renderer, rng):
 
 @pytest.mark.slow
 def test_cover_wanders_in_the_picture(renderer):
-    """The picture at a time is that of the cover that the twin has for it, and no cover leaves
+    """The picture at a time is that of the cover that the ref64 has for it, and no cover leaves
     0 to 1: at the ends of the range it is that of a clear and of an overcast sky.
     """
     still = {"wind.speed": 0.0, "wind.detail_speed": 0.0, "wind.weather_speed": 0.0}
@@ -242,7 +242,7 @@ def test_cover_wanders_in_the_picture(renderer):
         plain = nubis.Params().with_(**still)
         changes = {"wander.coverage": swing, "wander.seed": 4, "clouds.coverage": mean}
         wandering = plain.with_(**changes)
-        cover = noise_twin.cover(wandering, time)
+        cover = ref64_noise.cover(wandering, time)
         steady = plain.with_(**{"clouds.coverage": cover})
         pictures = (
             make.render(camera, p, time=time, background=None)[..., 3] for p in (wandering, steady)
@@ -261,7 +261,7 @@ def test_cover_wanders_in_the_picture(renderer):
 
     times = np.arange(0, 100_000, 600.0)
     wild = nubis.Params().with_(**{"wander.coverage": 1.0, "wander.seed": 4})
-    ends = [noise_twin.cover(wild, time) for time in times]
+    ends = [ref64_noise.cover(wild, time) for time in times]
     for end, time in ((0.0, times[np.argmin(ends)]), (1.0, times[np.argmax(ends)])):
         cover, wandering, steady = pair(1.0, 0.45, time)
         assert cover == end
@@ -296,7 +296,7 @@ def test_an_animation_of_a_wandering_wind_stays_near_the_still(renderer):
         **gale,
         **{"wind.updraft": 0.0, "high_clouds.coverage": 0.0, "wander.wind": 1.0},
     )
-    rate, phase = noise_twin.turns(params.wander, 0)
+    rate, phase = ref64_noise.turns(params.wander, 0)
     times = np.arange(0, 500_000, 60.0)
     speeds = np.abs(1 + np.exp(1j * (rate * times[:, None] + phase)).mean(axis=1))
     assert speeds.min() < 0.2
@@ -306,7 +306,7 @@ def test_an_animation_of_a_wandering_wind_stays_near_the_still(renderer):
     still = make.render(camera, params, time=shots[-1][2])
     assert np.isfinite(last).all()
     assert last.mean() == pytest.approx(still.mean(), rel=0.1)
-    assert twin.relative_rmse(last[..., :3], still[..., :3]) < 0.3
+    assert ref64.relative_rmse(last[..., :3], still[..., :3]) < 0.3
 
 
 @pytest.mark.slow_after(1)
@@ -323,9 +323,9 @@ def test_shadows_drift_with_the_wind(wander):
 
     def drift(time):
         wind = params.wind
-        shape = noise_twin.blown(params, wind.direction, wind.speed, time)
+        shape = ref64_noise.blown(params, wind.direction, wind.speed, time)
         return 0.5 * (
-            shape + noise_twin.blown(params, wind.weather_direction, wind.weather_speed, time)
+            shape + ref64_noise.blown(params, wind.weather_direction, wind.weather_speed, time)
         )
 
     period = 32.0 / (20.0 * (1.0 + params.wander.wind))

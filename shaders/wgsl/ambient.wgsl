@@ -35,7 +35,7 @@ fn clouded_sky(sky: vec3f) -> vec3f {
 }
 
 // Share of the ambient light at a point that comes from above; the rest comes from below.
-fn ambient_share(column: Column) -> f32 {
+fn ambient_share(column: WeatherSample) -> f32 {
     let thick = DIFFUSED * FILLING * column.coverage * frame.sky.extinction * column.thickness;
     let two_streams = (SKIN + column.depth_share * thick) / (2.0 * SKIN + thick);
     return mix(saturate(column.height), two_streams, params.light.ambient_occlusion);

@@ -53,7 +53,7 @@ fn air_depth_between(h0: f32, h1: f32, distance: f32) -> vec3f {
 
 // Where in the table of optical depths to space a direction is: by how far it is to the top of the air, between straight
 // up and the horizon, and by the distance of that (Bruneton and Neyret 2008).
-fn air_depth_coordinates(altitude: f32, mu: f32) -> vec2f {
+fn transmittance_lut_coordinates(altitude: f32, mu: f32) -> vec2f {
     let h = clamp(altitude, 0.0, AIR_TOP);
     let radius = params.atmosphere.planet_radius;
     let whole = sqrt(AIR_TOP * (2.0 * radius + AIR_TOP));
@@ -72,9 +72,9 @@ fn air_transmittance(h: f32, mu: f32) -> vec3f {
     if params.atmosphere.enabled == 0u {
         return vec3f(1.0);
     }
-    let size = vec2f(textureDimensions(air_depth));
-    let uv = (air_depth_coordinates(h, mu) * (size - 1.0) + 0.5) / size;
-    return exp(-textureSampleLevel(air_depth, clamp_sampler, uv, 0.0).rgb);
+    let size = vec2f(textureDimensions(transmittance_lut));
+    let uv = (transmittance_lut_coordinates(h, mu) * (size - 1.0) + 0.5) / size;
+    return exp(-textureSampleLevel(transmittance_lut, clamp_sampler, uv, 0.0).rgb);
 }
 
 // How much of the sun stands above the horizon of a point: 0 below it, 1 above, over the sun's half degree.
@@ -129,7 +129,7 @@ fn table_coordinates(table: u32, h: f32, mu: f32) -> vec2f {
 }
 
 fn air_light_at(table: u32, h: f32, mu: f32) -> vec3f {
-    return from_table(textureSampleLevel(air_light, clamp_sampler, table_coordinates(table, h, mu), 0.0).rgb);
+    return from_table(textureSampleLevel(multiscattering_lut, clamp_sampler, table_coordinates(table, h, mu), 0.0).rgb);
 }
 
 // Light that has been scattered before.
@@ -227,6 +227,6 @@ fn sky_texel(at: vec2f, size: vec2f) -> vec2f {
 // together. The irradiance can be anything.
 // Radiance of the air in a direction, without clouds, sun and ground.
 fn sky_radiance(direction: vec3f) -> vec3f {
-    let uv = sky_texel(sky_coordinates(direction), vec2f(textureDimensions(sky_map)));
-    return textureSampleLevel(sky_map, clamp_sampler, uv, 0.0).rgb * (frame.sky.sky_unit / frame.sky.sky_scale);
+    let uv = sky_texel(sky_coordinates(direction), vec2f(textureDimensions(sky_view_lut)));
+    return textureSampleLevel(sky_view_lut, clamp_sampler, uv, 0.0).rgb * (frame.sky.sky_unit / frame.sky.sky_scale);
 }

@@ -15,12 +15,12 @@ override SUNLIT: bool = true; // the sun can reach the clouds
 override RAINY: bool = true; // it may rain: cumulonimbus grow
 override RAIN_SHAFTS: bool = true; // rain is seen below the clouds
 override UPPER: bool = true; // there is a second deck
-override BROAD_WEATHER: bool = true; // a larger map shifts the weather
+override LARGE_SCALE_WEATHER: bool = true; // a larger map shifts the weather
 override PROFILE_TABLE: bool = false; // the profile by height is the user's table
-override BEAMS: bool = false; // clouds cast shadows on the air
+override LIGHT_SHAFTS: bool = false; // clouds cast shadows on the air
 override SCENE: bool = false; // there is a scene of the user's among the clouds
 override SUBRAYS: bool = false; // pixels may be wider than clouds, see subrays.wgsl
-override SPARSE: bool = false; // the clouds are known at the corners of cells of pixels alone, see lattice.wgsl
+override SPARSE: bool = false; // the clouds are known at the corners of cells of pixels alone, see sample_grid.wgsl
 override WIDE_PHASE: bool = false; // the phase function varies within a pixel
 override LIGHT_DETAIL: bool = true; // there are light samples that see the detail
 override LIGHT_CHEAP: bool = true; // there are light samples that do not
@@ -40,14 +40,14 @@ override LIGHT_CHEAP: bool = true; // there are light samples that do not
 @group(0) @binding(5) var detail_noise: texture_3d<f32>; // of the edges (passes/noise)
 @group(0) @binding(6) var curl_noise: texture_2d<f32>; // a divergence-free vector in xy (passes/noise)
 @group(0) @binding(7) var weather_map: texture_2d<f32>; // coverage, type, precipitation (passes/weather)
-@group(0) @binding(48) var broad_map: texture_2d<f32>; // shifts of those, and what bends the smaller map (passes/broad_weather)
+@group(0) @binding(48) var broad_map: texture_2d<f32>; // shifts of those, and what bends the smaller map (passes/large_scale_weather)
 @group(0) @binding(49) var profile_table: texture_2d<f32>; // density by type and height (passes/profile)
 @group(0) @binding(50) var phase_table: texture_2d<f32>; // phase function and its integral by angle (passes/phase)
 @group(0) @binding(8) var high_map: texture_2d<f32>; // density of the high clouds (passes/high_clouds)
-@group(0) @binding(9) var sky_map: texture_2d<f32>; // the sky by direction, times frame.sky.sky_scale (passes/sky)
-@group(0) @binding(60) var air_depth: texture_2d<f32>; // of the air to space, by altitude and direction (passes/transmittance)
-@group(0) @binding(61) var air_light: texture_2d<f32>; // scattered light by altitude and sun, see SCATTERED (passes/multiscatter)
-@group(0) @binding(62) var air_share: texture_3d<f32>; // share of the sky before a distance, by direction (passes/sky)
+@group(0) @binding(9) var sky_view_lut: texture_2d<f32>; // the sky by direction, times frame.sky.sky_scale (passes/sky)
+@group(0) @binding(60) var transmittance_lut: texture_2d<f32>; // of the air to space, by altitude and direction (passes/transmittance)
+@group(0) @binding(61) var multiscattering_lut: texture_2d<f32>; // scattered light by altitude and sun, see SCATTERED (passes/multiscatter)
+@group(0) @binding(62) var aerial_perspective_lut: texture_3d<f32>; // share of the sky before a distance, by direction (passes/sky)
 @group(0) @binding(10) var<storage, read_write> sky_light: array<vec4f, 4>; // what the sky gives to clouds (passes/sky)
 // The same for where it decides no branch: a load from storage costs lavapipe a loop over the lanes.
 @group(0) @binding(41) var<uniform> sky_light_uniform: array<vec4f, 4>;
@@ -65,10 +65,10 @@ override LIGHT_CHEAP: bool = true; // there are light samples that do not
 // Direct sun on the ground around the eye: levels in a stack, and, while they are baked, the mean of the last (passes/shadow).
 @group(0) @binding(72) var ground_shadow: texture_2d<f32>;
 @group(0) @binding(73) var ground_shadow_mean: texture_2d<f32>;
-// Light that the air before a distance lacks in those shadows, by place in the picture, times sky_scale (passes/beams).
-@group(0) @binding(51) var beams: texture_3d<f32>;
+// Light that the air before a distance lacks in those shadows, by place in the picture, times sky_scale (passes/light_shafts).
+@group(0) @binding(51) var light_shafts: texture_3d<f32>;
 
-// One entry a pixel, row by row; of the clouds one for each that they are known at (lattice.wgsl).
+// One entry a pixel, row by row; of the clouds one for each that they are known at (sample_grid.wgsl).
 @group(0) @binding(12) var<storage, read_write> clouds: array<vec4f>; // premultiplied radiance, transmittance
 @group(0) @binding(13) var<storage, read_write> cloud_depth: array<f32>; // m to the mean scattering point, -1 where none
 @group(0) @binding(14) var<storage, read_write> samples: array<u32>; // density evaluations
@@ -83,8 +83,8 @@ override LIGHT_CHEAP: bool = true; // there are light samples that do not
 @group(0) @binding(55) var<storage, read_write> corners: array<mat4x4f>;
 
 // Temporal reprojection: the marched subset, and the frame before.
-@group(0) @binding(17) var<storage, read_write> fresh: array<vec4f>;
-@group(0) @binding(18) var<storage, read_write> fresh_depth: array<f32>;
+@group(0) @binding(17) var<storage, read_write> current: array<vec4f>;
+@group(0) @binding(18) var<storage, read_write> current_depth: array<f32>;
 @group(0) @binding(19) var<storage, read_write> history: array<vec4f>;
 @group(0) @binding(20) var<storage, read_write> history_depth: array<f32>;
 @group(0) @binding(58) var<storage, read_write> cells: array<CellPast>;
@@ -141,7 +141,7 @@ struct ReferenceRay {
     stage: u32,
     level: u32, // how many times the panels have been halved
     evaluations: u32,
-    x: f32, // m into the stretches
+    x: f32, // m into the segments
     longest: f32, // length that the next panel may have, m
     optical_depth: f32,
     // The panel at hand, and what is known of its two points.
@@ -174,11 +174,11 @@ struct PathRay {
     origin: vec3f, // of the flight at hand
     scatterings: u32,
     direction: vec3f,
-    x: f32, // m into the stretches of the flight
-    flight: vec4f, // as `Stretches`
+    x: f32, // m into the segments of the flight
+    flight: vec4f, // as `Segments`
     shadow: f32, // transmittance toward the sun so far
     width: f32, // footprint, m
-    draws: u32, // random numbers used by the path
+    random_dimension: u32, // random numbers used by the path
     evaluations: u32,
     sunlight: vec3f, // what the sun adds to the path if nothing shadows it
 }

@@ -20,7 +20,7 @@ const UPPER_CLOUD = 1u; // of the deck above
 const RAIN = 2u; // below the base
 
 // What the weather alone says of a point: enough to know that there is nothing.
-struct Column {
+struct WeatherSample {
     limit: f32, // the base shape cannot exceed it; 0 where there is nothing
     profile: f32,
     coverage: f32,
@@ -98,16 +98,16 @@ fn eroded(shape: f32, detail: f32, height: f32) -> f32 {
 }
 
 // The weather at a point `p`, relative to the camera.
-fn cloud_column(p: vec3f, altitude: f32) -> Column {
+fn cloud_column(p: vec3f, altitude: f32) -> WeatherSample {
     evaluations += 1u;
     if VOLUME {
         let height = saturate((p.z - frame.sky.volume_low.z) / (frame.sky.volume_high.z - frame.sky.volume_low.z));
         let thickness = frame.sky.volume_high.z - frame.sky.volume_low.z;
-        return Column(select(0.0, 1.0, in_volume(p)), 1.0, 1.0, height, 0.0, p, CLOUD, thickness, height);
+        return WeatherSample(select(0.0, 1.0, in_volume(p)), 1.0, 1.0, height, 0.0, p, CLOUD, thickness, height);
     }
     let place = on_chart(p, altitude);
-    let at = leant(place, altitude);
-    let broad = broad_weather(at);
+    let at = sheared(place, altitude);
+    let broad = large_scale_weather(at);
     var weather = weather_from_map(weather_texel(frame.sky.weather_origin, at, broad));
     weather.coverage *= kept_clear(place);
     var column = cloud_in(weather, at, altitude);
@@ -128,7 +128,7 @@ fn cloud_column(p: vec3f, altitude: f32) -> Column {
 }
 
 // A place on the chart, without the wind's lean.
-fn leant(place: vec2f, altitude: f32) -> vec2f {
+fn sheared(place: vec2f, altitude: f32) -> vec2f {
     let lean = (altitude - params.clouds.base) / (params.clouds.top - params.clouds.base) * params.wind.shear;
     return place - lean * frame.sky.wind_direction;
 }
@@ -138,8 +138,8 @@ const BEND = vec2f(0.8, 0.6);
 
 // What a larger map shifts the weather by, and, in alpha, bends the smaller map by, so that it does not look like its own
 // repetition.
-fn broad_weather(at: vec2f) -> vec4f {
-    if BROAD_WEATHER {
+fn large_scale_weather(at: vec2f) -> vec4f {
+    if LARGE_SCALE_WEATHER {
         let uv = frame.sky.broad_origin + vec2f(at.x, -at.y) / params.weather.broad_extent;
         return textureSampleLevel(broad_map, repeat_sampler, uv, 0.0);
     }
@@ -148,13 +148,13 @@ fn broad_weather(at: vec2f) -> vec4f {
 
 fn weather_uv(origin: vec2f, at: vec2f, broad: vec4f) -> vec2f {
     let uv = origin + vec2f(at.x, -at.y) / params.weather.extent;
-    return select(uv, uv + frame.sky.broad_bend * broad.a * BEND, BROAD_WEATHER);
+    return select(uv, uv + frame.sky.broad_bend * broad.a * BEND, LARGE_SCALE_WEATHER);
 }
 
 // The weather map at a place `at` from where the eye is in its tile.
 fn weather_texel(origin: vec2f, at: vec2f, broad: vec4f) -> vec3f {
     let texel = textureSampleLevel(weather_map, weather_sampler, weather_uv(origin, at, broad), 0.0).rgb;
-    return select(texel, saturate(texel + frame.sky.broad_scale * broad.rgb), BROAD_WEATHER);
+    return select(texel, saturate(texel + frame.sky.broad_scale * broad.rgb), LARGE_SCALE_WEATHER);
 }
 
 // How much of a cumulonimbus stands where it rains so much: its tower in the core of the rain, its anvil farther around.
@@ -184,13 +184,13 @@ fn anvil(rain: f32, altitude: f32) -> f32 {
 }
 
 // The cloud at a place and altitude.
-fn cloud_in(weather: LocalWeather, at: vec2f, altitude: f32) -> Column {
+fn cloud_in(weather: LocalWeather, at: vec2f, altitude: f32) -> WeatherSample {
     let rain = weather.precipitation;
     let base = params.clouds.base;
     let height = (altitude - base) / (cloud_top(rain) - base);
     // The noise is at most 1: where the profile alone does not rise above 1 - coverage, nothing does.
     let inside = height > 0.0 && height < 1.0;
-    var column = Column(0.0, 0.0, weather.coverage, height, rain, vec3f(at, altitude), CLOUD, 0.0, 0.0);
+    var column = WeatherSample(0.0, 0.0, weather.coverage, height, rain, vec3f(at, altitude), CLOUD, 0.0, 0.0);
     column.profile = select(0.0, height_profile(height, weather.kind, tower(rain)), inside);
     column = with_extent(column, weather.kind, tower(rain), cloud_top(rain) - base);
     if RAINY {
@@ -204,7 +204,7 @@ fn cloud_in(weather: LocalWeather, at: vec2f, altitude: f32) -> Column {
 }
 
 // From where to where its profile lets a cloud reach: to where it falls below what the coverage asks for.
-fn with_extent(given: Column, kind: f32, rain: f32, whole: f32) -> Column {
+fn with_extent(given: WeatherSample, kind: f32, rain: f32, whole: f32) -> WeatherSample {
     var column = given;
     var edges = profile_edges(kind, rain);
     if PROFILE_TABLE {
@@ -217,7 +217,7 @@ fn with_extent(given: Column, kind: f32, rain: f32, whole: f32) -> Column {
 }
 
 // The deck above, with a weather and a wind of its own.
-fn upper_cloud_at(place: vec2f, altitude: f32, broad: vec4f) -> Column {
+fn upper_cloud_at(place: vec2f, altitude: f32, broad: vec4f) -> WeatherSample {
     let base = params.upper_clouds.base;
     let height = (altitude - base) / (params.upper_clouds.top - base);
     let lean = height * params.upper_clouds.shear * frame.sky.upper_direction;
@@ -228,23 +228,23 @@ fn upper_cloud_at(place: vec2f, altitude: f32, broad: vec4f) -> Column {
     let profile = height_profile(height, kind, 0.0);
     let inside = height > 0.0 && height < 1.0;
     let limit = select(0.0, with_coverage(profile, coverage), inside);
-    let column = Column(limit, profile, coverage, height, 0.0, at, UPPER_CLOUD, 0.0, 0.0);
+    let column = WeatherSample(limit, profile, coverage, height, 0.0, at, UPPER_CLOUD, 0.0, 0.0);
     return with_extent(column, kind, 0.0, params.upper_clouds.top - base);
 }
 
 // Rain below the base, thinned by the air that it falls through.
-fn rain_below(weather: LocalWeather, at: vec2f, altitude: f32) -> Column {
+fn rain_below(weather: LocalWeather, at: vec2f, altitude: f32) -> WeatherSample {
     let height = altitude / params.clouds.base;
     let wet = frame.sky.rain_reach * weather.precipitation * weather.coverage;
     let limit = select(0.0, saturate(2.0 * wet - 0.6 + 0.6 * height), altitude > 0.0);
     let streak = vec3f(at, altitude / RAIN_STRETCH + frame.sky.rain_fall);
     // All of the cloud is above it.
     let thickness = cloud_top(weather.precipitation) - params.clouds.base;
-    return Column(limit, 1.0, 1.0, 0.0, weather.precipitation, streak, RAIN, thickness, 0.0);
+    return WeatherSample(limit, 1.0, 1.0, 0.0, weather.precipitation, streak, RAIN, thickness, 0.0);
 }
 
 // The base shape, before detail: cheap, and never smaller than the density.
-fn cloud_shape(column: Column) -> f32 {
+fn cloud_shape(column: WeatherSample) -> f32 {
     return shape_in(column, base_noise(column));
 }
 
@@ -253,7 +253,7 @@ fn cloud_shape(column: Column) -> f32 {
 // 0.285, 330 m 0.263 and 650 m 0.228, so that what there is depended on the size of pictures and steps; and pictures of 160x90 in
 // `draft` erred by 0.19, 0.14 and 0.25 where they err by 0.15, 0.13 and 0.21 (`fair_weather`, `stratocumulus`, `above`), in the
 // same time. Of what is smaller than a pixel several rays find the mean (passes/march).
-fn base_noise(column: Column) -> f32 {
+fn base_noise(column: WeatherSample) -> f32 {
     if VOLUME {
         return volume_density(column.at);
     }
@@ -263,7 +263,7 @@ fn base_noise(column: Column) -> f32 {
 }
 
 // The base shape where that noise is known.
-fn shape_in(column: Column, noise: f32) -> f32 {
+fn shape_in(column: WeatherSample, noise: f32) -> f32 {
     if VOLUME {
         return select(0.0, noise, column.limit > 0.0);
     }
@@ -280,7 +280,7 @@ fn scaled(width: f32, upper: bool) -> f32 {
 }
 
 // The density at a point whose shape is known. `width` is the size of what one sample stands for, in metres.
-fn cloud_density(column: Column, shape: f32, width: f32) -> f32 {
+fn cloud_density(column: WeatherSample, shape: f32, width: f32) -> f32 {
     if VOLUME {
         return shape;
     }
@@ -303,7 +303,7 @@ fn detail_at(at: vec3f, tiles: f32) -> f32 {
 }
 
 // The density of a medium as a share of `extinction`: of cloud that has been eroded, or of rain, which is not.
-fn with_share(column: Column, cloud: f32, rain: f32) -> f32 {
+fn with_share(column: WeatherSample, cloud: f32, rain: f32) -> f32 {
     if !(UPPER || RAIN_SHAFTS) {
         return cloud;
     }

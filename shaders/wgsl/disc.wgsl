@@ -92,7 +92,7 @@ fn disc_transmittance(direction: vec3f) -> vec3f {
     if !AIR {
         return vec3f(1.0);
     }
-    let way = air_way(direction);
+    let way = air_segment(direction);
     let altitude = select(max(frame.view.altitude, 0.0), AIR_TOP, frame.view.power_air > 0.0);
     let through = air_transmittance(altitude, cos_zenith_along(direction, way.start, altitude));
     return select(vec3f(1.0), through, way.length > 0.0);

@@ -253,16 +253,16 @@ fn is_sunlit() -> bool {
 }
 
 // What a ray has gathered on its way through the clouds. Scalars alone are summed, for each of the four distances of
-// `Nodes` by its share in the sample's; colours come once, at the end. Without air all have the first.
+// `AerialPoints` by its share in the sample's; colours come once, at the end. Without air all have the first.
 struct Gathered {
     sun: vec4f, // of sun_scattering
     above: vec4f, // share of the ambient light from above
     weight: vec4f, // of all samples: together 1 less the transmittance
 }
 
-fn gather(sum: Gathered, nodes: Nodes, weight: f32, sun: f32, above: f32, distance: f32) -> Gathered {
+fn gather(sum: Gathered, nodes: AerialPoints, weight: f32, sun: f32, above: f32, distance: f32) -> Gathered {
     if AIR {
-        let w = weight * node_shares(nodes, distance);
+        let w = weight * aerial_point_shares(nodes, distance);
         return Gathered(sum.sun + w * sun, sum.above + w * above, sum.weight + w);
     }
     return Gathered(
@@ -281,7 +281,7 @@ fn gathered_weight(sum: Gathered) -> f32 {
 }
 
 // The radiance of what was gathered along a ray from the eye, seen through the air.
-fn gathered_radiance(sum: Gathered, nodes: Nodes, direction: vec3f) -> vec3f {
+fn gathered_radiance(sum: Gathered, nodes: AerialPoints, direction: vec3f) -> vec3f {
     if AIR {
         return radiance_through_air(sum, nodes, direction);
     }
@@ -294,15 +294,15 @@ fn gathered_radiance(sum: Gathered, nodes: Nodes, direction: vec3f) -> vec3f {
     return sun + sum.above.x * ambient_above(vec3f(0.0)) + below * ambient_below(ground);
 }
 
-fn radiance_through_air(sum: Gathered, nodes: Nodes, direction: vec3f) -> vec3f {
-    let way = air_way(direction);
+fn radiance_through_air(sum: Gathered, nodes: AerialPoints, direction: vec3f) -> vec3f {
+    let way = air_segment(direction);
     let texels = air_texels(direction);
     let sky = sky_radiance(direction);
     var radiance = vec3f(0.0);
     var depth = vec3f(0.0);
     var before = min(way.start, nodes.start);
     for (var k = 0u; k < 4u; k++) {
-        let distance = node_distance(nodes, f32(k));
+        let distance = aerial_point_distance(nodes, f32(k));
         depth += aerial_depth(direction, before, distance, select(PIECES, FIRST_PIECES, k == 0u));
         before = distance;
         let air = air_of(depth, distance, way, texels, sky);

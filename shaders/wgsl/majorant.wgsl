@@ -25,12 +25,12 @@ fn majorant_at(p: vec3f, altitude: f32) -> Majorant {
     } else {
         let thickness = frame.sky.shell_top - frame.sky.shell_base;
         let height = (altitude - frame.sky.shell_base) / thickness;
-        let at = leant(on_chart(p, altitude), altitude);
-        let uv = weather_uv(frame.sky.weather_origin, at, broad_weather(at));
+        let at = sheared(on_chart(p, altitude), altitude);
+        let uv = weather_uv(frame.sky.weather_origin, at, large_scale_weather(at));
         cell = vec3f(within_map(uv), height) * size;
         // Going up a metre also goes sideways in the map, by the wind's lean, and across by more where the map is bent.
         let lean = abs(params.wind.shear) / (params.clouds.top - params.clouds.base);
-        let bend = select(0.0, frame.sky.broad_stretch, BROAD_WEATHER);
+        let bend = select(0.0, frame.sky.broad_stretch, LARGE_SCALE_WEATHER);
         // A step changes the chart's scale by less than a hundredth.
         let scale = 1.01 * max(chart_scale(p, altitude), 1.0);
         let across = params.weather.extent / max(size.x, size.y) / (1.0 + lean) / (1.0 + bend) / scale;

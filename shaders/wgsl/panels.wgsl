@@ -8,7 +8,7 @@
 // Where the two points lie in a panel: (1 - 1 / sqrt 3) / 2 from its ends.
 const GAUSS = 0.21132486540518713;
 
-// A piece of a ray, in metres into its stretches.
+// A piece of a ray, in metres into its segments.
 struct Panel {
     begin: f32,
     end: f32,
@@ -21,8 +21,8 @@ struct Reading {
     precipitation: vec2f,
 }
 
-// The panel that begins `x` metres into the stretches of a ray: at most `longest`, within one stretch and one cell.
-fn panel_from(origin: vec3f, direction: vec3f, s: Stretches, x: f32, longest: f32) -> Panel {
+// The panel that begins `x` metres into the segments of a ray: at most `longest`, within one stretch and one cell.
+fn panel_from(origin: vec3f, direction: vec3f, s: Segments, x: f32, longest: f32) -> Panel {
     var end = x + longest;
     if x < s.first {
         end = min(end, s.first);
@@ -35,16 +35,16 @@ fn panel_from(origin: vec3f, direction: vec3f, s: Stretches, x: f32, longest: f3
 }
 
 // No panel is shorter, m: far from the eye positions are rounded by more than a millimetre.
-fn shortest_panel(s: Stretches, x: f32) -> f32 {
+fn shortest_panel(s: Segments, x: f32) -> f32 {
     return max(4e-7 * (s.start + x), 1e-3);
 }
 
-// The two points of a panel, in metres into the stretches.
+// The two points of a panel, in metres into the segments.
 fn panel_points(panel: Panel) -> vec2f {
     return mix(vec2f(panel.begin), vec2f(panel.end), vec2f(GAUSS, 1.0 - GAUSS));
 }
 
-fn read_panel(panel: Panel, origin: vec3f, direction: vec3f, s: Stretches, width: f32) -> Reading {
+fn read_panel(panel: Panel, origin: vec3f, direction: vec3f, s: Segments, width: f32) -> Reading {
     let points = panel_points(panel);
     let p = origin + stretch_distance(s, points.x) * direction;
     let q = origin + stretch_distance(s, points.y) * direction;

@@ -27,7 +27,7 @@ fn draine(one_minus_mu: f32, g: f32, alpha: f32) -> f32 {
 // A direction scattered from `direction` by Henyey and Greenstein's function, for two random numbers. The cosine comes as
 // its difference to 1, without the cancellations of the printed form (hazard 5).
 fn scattered(direction: vec3f, g: f32, u: vec2f) -> vec3f {
-    return turned(direction, scattered_cosine(g, u.x), u.y);
+    return rotate_by(direction, scattered_cosine(g, u.x), u.y);
 }
 
 // Of that, 1 minus the cosine.
@@ -40,7 +40,7 @@ fn scattered_cosine(g: f32, u: f32) -> f32 {
 }
 
 // The direction at an angle to `direction` whose cosine is less than 1 by `one_minus_mu`, at a random place around it.
-fn turned(direction: vec3f, one_minus_mu: f32, u: f32) -> vec3f {
+fn rotate_by(direction: vec3f, one_minus_mu: f32, u: f32) -> vec3f {
     let sine = sqrt(one_minus_mu * (2.0 - one_minus_mu));
     let angle = 2.0 * PI * u - PI;
     let across = perpendicular(direction);

@@ -17,7 +17,7 @@ fn scene_radiance(pixel: vec2u) -> vec3f {
 }
 
 fn scene_texel(pixel: vec2u) -> vec2u {
-    return scene_texel_of((pixel.y - dispatch.sheet_row) * frame.view.width + pixel.x);
+    return scene_texel_of((pixel.y - dispatch.strip_row) * frame.view.width + pixel.x);
 }
 
 // The texel of the pixel with that number in the sheet.
@@ -25,12 +25,12 @@ fn scene_texel_of(index: u32) -> vec2u {
     return vec2u(index % SCENE_ROW, index / SCENE_ROW);
 }
 
-// The part of a ray's stretches that lies in front of a distance along it.
-fn stretches_before(s: Stretches, distance: f32) -> Stretches {
+// The part of a ray's segments that lies in front of a distance along it.
+fn segments_before(s: Segments, distance: f32) -> Segments {
     if !SCENE {
         return s;
     }
     let first = clamp(distance - s.start, 0.0, s.first);
     let second = clamp(distance - s.start - s.first - s.gap, 0.0, s.second);
-    return Stretches(s.start, first, s.gap, second);
+    return Segments(s.start, first, s.gap, second);
 }

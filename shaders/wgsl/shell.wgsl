@@ -66,9 +66,9 @@ fn cos_zenith_along(direction: vec3f, distance: f32, altitude: f32) -> f32 {
     return up / (params.atmosphere.planet_radius + altitude);
 }
 
-// The part of a ray where there can be cloud: up to two stretches, the second after the ray has passed under the base.
+// The part of a ray where there can be cloud: up to two segments, the second after the ray has passed under the base.
 // It runs to the last exit of the shell: ending it at the first would cut a band along the horizon.
-struct Stretches {
+struct Segments {
     start: f32,
     first: f32, // length of the first stretch
     gap: f32, // length of the gap after it
@@ -76,7 +76,7 @@ struct Stretches {
 }
 
 // Of a ray from the camera, to the ground at most.
-fn cloud_stretches(direction: vec3f) -> Stretches {
+fn cloud_segments(direction: vec3f) -> Segments {
     let ground = hit_sphere(direction, frame.view.power_ground);
     let end = select(1e30, ground.near, ground.enters);
     if VOLUME {
@@ -87,7 +87,7 @@ fn cloud_stretches(direction: vec3f) -> Stretches {
 }
 
 // Of a ray from a point, as if there were no ground.
-fn cloud_stretches_from(p: vec3f, direction: vec3f) -> Stretches {
+fn cloud_stretches_from(p: vec3f, direction: vec3f) -> Segments {
     if VOLUME {
         return box_stretch(p, direction, 1e30);
     }
@@ -98,24 +98,24 @@ fn cloud_stretches_from(p: vec3f, direction: vec3f) -> Stretches {
     );
 }
 
-fn stretches_between(outer: Hit, inner: Hit, limit: f32) -> Stretches {
+fn stretches_between(outer: Hit, inner: Hit, limit: f32) -> Segments {
     if !outer.hit {
-        return Stretches(0.0, 0.0, 0.0, 0.0);
+        return Segments(0.0, 0.0, 0.0, 0.0);
     }
     let end = min(outer.far, limit);
     if !inner.hit || inner.near >= end {
-        return Stretches(outer.near, max(end - outer.near, 0.0), 0.0, 0.0);
+        return Segments(outer.near, max(end - outer.near, 0.0), 0.0, 0.0);
     }
     let first = max(inner.near - outer.near, 0.0);
     let second = max(end - inner.far, 0.0);
     if first == 0.0 {
-        return Stretches(inner.far, second, 0.0, 0.0);
+        return Segments(inner.far, second, 0.0, 0.0);
     }
-    return Stretches(outer.near, first, inner.far - inner.near, second);
+    return Segments(outer.near, first, inner.far - inner.near, second);
 }
 
 // Through the box of the user's grid. A direction along a face divides by a number that is small, not zero (hazard 17).
-fn box_stretch(p: vec3f, direction: vec3f, limit: f32) -> Stretches {
+fn box_stretch(p: vec3f, direction: vec3f, limit: f32) -> Segments {
     let d = select(direction, vec3f(1e-20), abs(direction) < vec3f(1e-20));
     let a = (frame.sky.volume_low - p) / d;
     let b = (frame.sky.volume_high - p) / d;
@@ -123,10 +123,10 @@ fn box_stretch(p: vec3f, direction: vec3f, limit: f32) -> Stretches {
     let far = max(a, b);
     let start = max(max(near.x, near.y), max(near.z, 0.0));
     let end = min(min(far.x, far.y), min(far.z, limit));
-    return Stretches(start, max(end - start, 0.0), 0.0, 0.0);
+    return Segments(start, max(end - start, 0.0), 0.0, 0.0);
 }
 
-// The distance along a ray that lies `x` metres into its stretches.
-fn stretch_distance(s: Stretches, x: f32) -> f32 {
+// The distance along a ray that lies `x` metres into its segments.
+fn stretch_distance(s: Segments, x: f32) -> f32 {
     return s.start + x + select(0.0, s.gap, x > s.first);
 }

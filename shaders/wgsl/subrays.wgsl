@@ -3,14 +3,14 @@
 #import bindings
 #import camera
 #import shell
-#import lattice
+#import sample_grid
 
 // How many rays are marched through a pixel: as many as clouds fit into it where its ray meets them.
 fn rays_through(view: vec3f) -> f32 {
     if !SUBRAYS {
         return 1.0;
     }
-    let width = cloud_stretches(view).start * pixel_width(view) * f32(spacing()) / (CLOUD_WIDTH * frame.sky.leap_scale);
+    let width = cloud_segments(view).start * pixel_width(view) * f32(spacing()) / (CLOUD_WIDTH * frame.sky.leap_scale);
     return clamp(ceil(width * width), 1.0, frame.view.most_rays);
 }
 

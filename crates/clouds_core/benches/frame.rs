@@ -106,7 +106,7 @@ fn main() {
         scene.params.high_clouds.seed += 1;
         scene.bake();
     });
-    passes(&mut group, &mut scene, &["sky_map_bake", "air_share_bake", "sky_light_bake"], |scene| {
+    passes(&mut group, &mut scene, &["sky_view_bake", "aerial_perspective_bake", "sky_light_bake"], |scene| {
         scene.params.sun.azimuth = (scene.params.sun.azimuth + 1.0) % 360.0;
         scene.bake();
     });

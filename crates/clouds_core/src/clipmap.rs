@@ -6,7 +6,7 @@
 use glam::{DVec2, DVec3};
 
 use crate::params::{self, Params};
-use crate::wind::{Carried, fastest};
+use crate::wind::{Advection, fastest};
 
 /// Side of the grid of places, m: a tenth of the finest level of the ground's shadows (passes/shadow.rs).
 const EYE_STEP: f64 = 600.0;
@@ -64,11 +64,11 @@ pub(crate) fn origin(eye: DVec3, params: &Params, time: f64) -> Origin {
 }
 
 /// Where the eye is in the levels of its picture.
-pub(crate) fn eye_in(eye: DVec3, params: &Params, time: f64) -> [f32; 2] {
+pub(crate) fn camera_in_clipmap(eye: DVec3, params: &Params, time: f64) -> [f32; 2] {
     let origin = origin(eye, params, time);
     let drift = match params.volume {
         Some(_) => DVec2::ZERO,
-        None => Carried::new(params, origin.time, time).drift().truncate(),
+        None => Advection::new(params, origin.time, time).drift().truncate(),
     };
     (eye.truncate() - origin.place - drift).as_vec2().to_array()
 }

@@ -16,7 +16,7 @@ use crate::params;
 use crate::params::{Edge, Model, Params, Phase};
 use crate::shared::constants;
 use crate::uniforms::{Dispatch, Sky, View, uniform};
-use crate::wind::Carried;
+use crate::wind::Advection;
 
 /// A frame of a picture or of an answer: its uniform blocks, and what its kernels are compiled for.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -29,7 +29,7 @@ pub struct Frame {
     pub dispatch: Dispatch,
     /// How the camera projects.
     pub projection: Projection,
-    /// The clouds are known at the corners of cells of pixels alone (lattice.wgsl).
+    /// The clouds are known at the corners of cells of pixels alone (sample_grid.wgsl).
     pub sparse: bool,
     /// There are high clouds.
     pub high_clouds: bool,
@@ -44,7 +44,7 @@ pub struct Frame {
     /// Clouds cast shadows on the ground in sight.
     pub ground_shadow: bool,
     /// Clouds cast shadows on the air in sight.
-    pub beams: bool,
+    pub light_shafts: bool,
 }
 
 constants! {
@@ -189,7 +189,7 @@ impl Frame {
         frame.set_volume(camera.eye, params);
         frame.sky.leap_scale = leap_scale(params);
         frame.sky.shadow_texel = clipmap::texel(frame.view.altitude);
-        frame.sky.shadow_eye = clipmap::eye_in(camera.eye, params, time);
+        frame.sky.shadow_eye = clipmap::camera_in_clipmap(camera.eye, params, time);
         frame.high_clouds = params.has_high_clouds();
         frame.sky.sun_direction = sun_direction(params).as_vec3().to_array();
         frame.set_high_sun(params);
@@ -294,8 +294,8 @@ impl Frame {
         let shown = params.sun.visible && params.sun.irradiance != [0.0; 3];
         let sun = Some(self.view.sun_bounds).filter(|_| shown);
         for [left, top, right, bottom] in sun.into_iter().chain([self.view.moon_bounds]) {
-            let first_row = (top.floor() as u32).max(self.dispatch.sheet_row);
-            let end_row = (bottom.ceil() as u32).min(self.dispatch.sheet_row + self.dispatch.rows);
+            let first_row = (top.floor() as u32).max(self.dispatch.strip_row);
+            let end_row = (bottom.ceil() as u32).min(self.dispatch.strip_row + self.dispatch.rows);
             if !(left < right && top < bottom) || first_row >= end_row {
                 continue;
             }
@@ -323,17 +323,17 @@ impl Frame {
         self.view.altitude > self.sky.shell_top && away * pixel > CLOUD_WIDTH * self.sky.leap_scale
     }
 
-    /// How many pixels of the whole picture the clouds are known at, across and down (lattice.wgsl).
+    /// How many pixels of the whole picture the clouds are known at, across and down (sample_grid.wgsl).
     pub fn known(&self) -> [u32; 2] {
         grid::known([self.view.width, self.view.height], self.sparse)
     }
 
     /// The same for the march of a sheet: of all its pixels, or of those that its clouds are known at.
     pub fn of_known(&self) -> Self {
-        let [march_width, sheet_rows] = grid::known([self.view.width, self.dispatch.sheet_rows], self.sparse);
+        let [march_width, strip_rows] = grid::known([self.view.width, self.dispatch.strip_rows], self.sparse);
         let stride = grid::spacing(self.sparse);
-        let sheet_row = self.dispatch.sheet_row / stride;
-        let dispatch = Dispatch { stride, march_width, sheet_row, sheet_rows, ..self.dispatch.clone() };
+        let strip_row = self.dispatch.strip_row / stride;
+        let dispatch = Dispatch { stride, march_width, strip_row, strip_rows, ..self.dispatch.clone() };
         Self { dispatch, ..self.clone() }
     }
 
@@ -363,7 +363,7 @@ impl Frame {
     }
 
     /// Whether clouds cast shadows on the air that `camera` sees.
-    pub fn has_beams(&self, camera: &Camera, params: &Params) -> bool {
+    pub fn has_light_shafts(&self, camera: &Camera, params: &Params) -> bool {
         let air = &params.atmosphere;
         let top = highest(params);
         let radius = f64::from(air.planet_radius);
@@ -463,8 +463,8 @@ impl Frame {
         let top = highest(params);
         self.view.power_shade = power(top);
         let tangent = |altitude: f64| (altitude.max(0.0) * (2.0 * radius + altitude)).sqrt();
-        self.view.beam_start = (h - top).max(0.0) as f32;
-        self.view.beam_length = (tangent(h) + tangent(top) - f64::from(self.view.beam_start)).max(1.0) as f32;
+        self.view.shaft_start = (h - top).max(0.0) as f32;
+        self.view.shaft_length = (tangent(h) + tangent(top) - f64::from(self.view.shaft_start)).max(1.0) as f32;
         self.view.power_high = power(f64::from(params.high_clouds.altitude));
         self.view.power_air = power(AIR_TOP);
     }
@@ -493,7 +493,7 @@ impl Frame {
     }
 
     /// The noises and the weather of the upper deck, which are scaled with it.
-    fn set_upper_wind(&mut self, eye: DVec2, params: &Params, carried: &Carried) {
+    fn set_upper_wind(&mut self, eye: DVec2, params: &Params, carried: &Advection) {
         let (clouds, upper) = (&params.clouds, &params.upper_clouds);
         let scale = f64::from(upper.scale);
         let (shape, detail) = (eye - carried.upper, eye - carried.upper_detail);
@@ -515,7 +515,7 @@ impl Frame {
 
     fn set_wind(&mut self, eye: DVec3, params: &Params, time: f64) {
         let (clouds, wind, high) = (&params.clouds, &params.wind, &params.high_clouds);
-        let carried = Carried::at(params, time);
+        let carried = Advection::at(params, time);
         let volume = |at: DVec2, scale: f32| [wrap(at.x, scale), wrap(at.y, scale), wrap(-carried.rise, scale)];
         let plane = |at: DVec2, scale: f32| [wrap(at.x, scale), wrap(at.y, scale)];
         self.sky.wind_direction = compass(f64::from(wind.direction)).as_vec2().to_array();
@@ -572,7 +572,7 @@ impl Frame {
     }
 
     /// Notes what has changed since the frame before, for reprojection.
-    pub(crate) fn set_previous(&mut self, previous: &Self, eye_motion: DVec3, carried: &Carried) {
+    pub(crate) fn set_previous(&mut self, previous: &Self, eye_motion: DVec3, carried: &Advection) {
         self.view.previous_right = previous.view.right;
         self.view.previous_up = previous.view.up;
         self.view.previous_forward = previous.view.forward;

@@ -1,5 +1,5 @@
 //! Writes what other languages need to know of the parameters: `python/nubis/params.py` and `docs/parameters.md`.
-//! `make generate` (part of `make build`) puts them in place; a test keeps them fresh.
+//! `make generate` (part of `make build`) puts them in place; a test keeps them current.
 
 use std::fmt::Write as _;
 

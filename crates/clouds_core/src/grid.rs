@@ -50,7 +50,7 @@ const ORDER: [[u32; 2]; 16] = [
 ];
 
 /// Frames in which every pixel that is known is marched once.
-pub(crate) const fn round(sparse: bool) -> u32 {
+pub(crate) const fn cycle(sparse: bool) -> u32 {
     stride(sparse) * stride(sparse)
 }
 
@@ -63,5 +63,5 @@ pub(crate) fn cells(known: [u32; 2], sparse: bool) -> [u32; 2] {
 pub(crate) fn subpixel(index: u32, sparse: bool) -> [u32; 2] {
     // The first four are the corners of quarters of the cell, and sparse cells twice as wide.
     let scale = if sparse { 2 } else { 1 };
-    ORDER[(index % round(sparse)) as usize].map(|place| scale * place)
+    ORDER[(index % cycle(sparse)) as usize].map(|place| scale * place)
 }

@@ -8,7 +8,7 @@ use crate::params::{self, Params};
 use crate::scene_depth::{SceneDepth, SceneTextures};
 use crate::shot::Shot;
 use crate::targets::TemporalTargets;
-use crate::wind::Carried;
+use crate::wind::Advection;
 
 /// The frame before.
 pub(crate) struct Past {
@@ -118,7 +118,7 @@ impl Frame {
         resized: Option<&TemporalTargets>,
     ) {
         let Some(last) = last else { return };
-        let carried = Carried::between((&last.params, last.time), (params, shot.time));
+        let carried = Advection::between((&last.params, last.time), (params, shot.time));
         self.set_previous(&last.frame, shot.camera.eye - last.camera.eye, &carried);
         let scene = shot.scene.map(|scene| scene.distance);
         let still = last.camera == *shot.camera && self.view.cloud_motion == [0.0; 3] && last.scene.as_deref() == scene;
@@ -126,7 +126,7 @@ impl Frame {
         if let Some(old) = resized {
             [self.view.previous_width, self.view.previous_height] = old.size;
             self.view.previous_spacing = grid::spacing(old.sparse);
-            self.view.previous_round = grid::round(old.sparse);
+            self.view.previous_cycle = grid::cycle(old.sparse);
         }
     }
 }

@@ -17,7 +17,7 @@ use crate::scene_depth::SceneDepth;
 use crate::shot::Shot;
 
 /// Light that is fainter than this share of the other source's, or of the night's, is left out.
-const FAINT: f64 = 1e-4;
+const NEGLIGIBLE: f64 = 1e-4;
 /// By how many powers of two light falls with each degree that its source is under the horizon. Measured, the brightest of sky
 /// and clouds: 9, 17, 26 and 34 at 6, 12, 18 and 24 degrees.
 const DUSK: f64 = 1.4;
@@ -39,8 +39,8 @@ impl Lights {
         let night = std::f64::consts::PI * f64::from(night.into_iter().fold(0.0, f32::max));
         let sun = strength(sun_direction(params), params.sun.irradiance);
         let moon = if params.moon.exists() { strength(params.moon.direction(), params.moon.light()) } else { 0.0 };
-        let by_moon = moon > FAINT * sun.max(night);
-        let by_sun = !by_moon || sun > FAINT * moon.max(night);
+        let by_moon = moon > NEGLIGIBLE * sun.max(night);
+        let by_sun = !by_moon || sun > NEGLIGIBLE * moon.max(night);
         let mut lit = by_moon.then(|| moonlit(params));
         if let (true, Some(second)) = (by_sun, &mut lit) {
             second.moon.visible = false;

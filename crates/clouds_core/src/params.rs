@@ -685,7 +685,7 @@ impl Params {
     }
 
     /// Whether the larger weather map is in use.
-    pub fn has_broad_weather(&self) -> bool {
+    pub fn has_large_scale_weather(&self) -> bool {
         self.volume.is_none() && self.broad_shares().total > 0.0
     }
 

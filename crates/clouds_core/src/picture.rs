@@ -17,20 +17,20 @@ pub struct Picture {
     /// Density evaluations, primary and light together.
     pub samples: Vec<u32>,
     /// Four numbers a pixel: how sure the radiance of the clouds is, and 0. A standard error where paths are traced, the
-    /// change by the last halving where rays converge, nothing where they are marched.
+    /// change by the last halving where rays converge, nothing where they are cloud_buffers.
     pub uncertainty: Vec<f32>,
 }
 
 /// Brings a strip of a still back.
 pub(crate) fn download(rec: &mut Recorder<'_>, frame: &Frame, targets: &StillTargets, layers: bool) {
-    let StillTargets { marched, composed, rays, .. } = targets;
+    let StillTargets { cloud_buffers, output, rays, .. } = targets;
     let pixels = count([frame.view.width, frame.dispatch.rows]);
-    rec.download(&composed.image, 0, 16 * pixels);
+    rec.download(&output.image, 0, 16 * pixels);
     if layers {
-        rec.download(&composed.sky, 0, 16 * pixels);
-        rec.download(&composed.depth, 0, 4 * pixels);
+        rec.download(&output.sky, 0, 16 * pixels);
+        rec.download(&output.depth, 0, 4 * pixels);
         let known = grid::known([frame.view.width, frame.dispatch.rows], frame.sparse);
-        rec.download(&marched.samples, 0, 4 * count(known));
+        rec.download(&cloud_buffers.samples, 0, 4 * count(known));
         if let Some(rays) = rays {
             rec.download(&rays.uncertainty, 0, 16 * pixels);
         }

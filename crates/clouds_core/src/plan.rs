@@ -92,9 +92,9 @@ impl Plan {
     pub fn set_strip(&self, frame: &mut Frame, quality: &Quality, strip: &Range<u32>) {
         let lattice = self.integrator == Integrator::March && refine::is_needed(frame, quality);
         let shared = u32::from(lattice && strip.end < frame.view.height);
-        frame.dispatch.sheet_row = strip.start;
+        frame.dispatch.strip_row = strip.start;
         frame.dispatch.rows = strip.len() as u32;
-        frame.dispatch.sheet_rows = frame.dispatch.rows + shared;
+        frame.dispatch.strip_rows = frame.dispatch.rows + shared;
     }
 
     /// Most rows that the buffers of a strip hold.

@@ -114,7 +114,7 @@ impl Renderer {
         let room = self.gpu.buffer("shadow_out", 4 * u64::from(size) * u64::from(size));
         let (mut rec, mut frame) = self.record(&Shot::new(&camera, params, time), interrupt)?;
         [frame.view.width, frame.view.height] = [size; 2];
-        [frame.dispatch.march_width, frame.dispatch.sheet_rows] = [size; 2];
+        [frame.dispatch.march_width, frame.dispatch.strip_rows] = [size; 2];
         frame.sky.shadow_texel = (extent / f64::from(size)) as f32;
         shadow::map(&mut rec, &frame, size, &room);
         rec.download(&room, 0, room.size());
@@ -184,7 +184,7 @@ impl Renderer {
     /// A recording in which the LUTs of a sky are bound, and its frame.
     fn record<'a>(&'a mut self, shot: &Shot<'_>, interrupt: Interrupt<'a>) -> Result<(Recorder<'a>, Frame)> {
         let (mut frame, params) = shot.checked(self.size, &self.quality)?;
-        frame.beams = false;
+        frame.light_shafts = false;
         self.timings = Timings::default();
         let mut rec = Recorder::new(&self.gpu, &mut self.timings, interrupt);
         let specialization = specialization::of_picture(&params, &self.quality, &frame, false);

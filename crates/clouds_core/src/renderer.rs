@@ -22,8 +22,8 @@ use crate::shot::{Shot, check_size};
 use crate::targets::{StillTargets, TemporalTargets, count, fit_temporal};
 use crate::wind::Going;
 
-/// What [`Renderer::history_length`] says of a pixel that has had a ray of its own: frames in which every pixel is marched once.
-pub const ROUND: u32 = grid::round(false);
+/// What [`Renderer::history_length`] says of a pixel that has had a ray of its own: frames in which every pixel is cloud_buffers once.
+pub const CYCLE: u32 = grid::cycle(false);
 
 /// Makes pictures of one size with one numerical method on one device.
 pub struct Renderer {
@@ -140,19 +140,19 @@ impl Renderer {
         for strip in &plan.strips {
             plan.set_strip(&mut frame, &self.quality, strip);
             let targets = StillTargets::fit(&mut self.still, &self.gpu, &frame, plan.integrator);
-            let StillTargets { refined, marched, composed, backdrop, rays, .. } = targets;
+            let StillTargets { ray_list, cloud_buffers, output, background_corners, rays, .. } = targets;
             if let (Some(textures), Some(given)) = (scene, &shot.scene) {
                 let [first, pixels] =
-                    [strip.start, frame.dispatch.sheet_rows].map(|rows| rows as usize * frame.view.width as usize);
+                    [strip.start, frame.dispatch.strip_rows].map(|rows| rows as usize * frame.view.width as usize);
                 textures.upload(&self.gpu, given, first..first + pixels);
             }
             match (plan.integrator, rays) {
-                (Integrator::Reference, Some(rays)) => reference::run(&mut rec, &frame, rays, marched)?,
-                (Integrator::Path, Some(rays)) => path::run(&mut rec, &frame, rays, marched)?,
-                _ if frame.cloudless => rec.clear(&marched.samples),
-                _ => march::record(&mut rec, &frame.of_known(), &self.quality, refined, marched),
+                (Integrator::Reference, Some(rays)) => reference::run(&mut rec, &frame, rays, cloud_buffers)?,
+                (Integrator::Path, Some(rays)) => path::run(&mut rec, &frame, rays, cloud_buffers)?,
+                _ if frame.cloudless => rec.clear(&cloud_buffers.samples),
+                _ => march::record(&mut rec, &frame.of_known(), &self.quality, ray_list, cloud_buffers),
             }
-            let parts = Parts { marched, backdrop, refined, out: composed };
+            let parts = Parts { cloud_buffers, background_corners, ray_list, out: output };
             composite::record(&mut rec, &frame, &params, &parts, plan.by_cells);
             download(&mut rec, &frame, targets, layers);
             picture.append(&rec.flush()?, &frame, layers);
@@ -162,7 +162,7 @@ impl Renderer {
     }
 
     /// The next frame of an animation by one light, onto a screen or, without one, to memory: a sixteenth of its pixels is
-    /// marched, the others follow the clouds from the frame before. The first frame, and the first after a cut, is a still.
+    /// cloud_buffers, the others follow the clouds from the frame before. The first frame, and the first after a cut, is a still.
     pub(crate) fn next_frame(
         &mut self,
         shot: &Shot<'_>,
@@ -195,7 +195,7 @@ impl Renderer {
         let resized = resized.filter(|_| last.is_some());
         upload_scenes(&mut self.scene_depth, targets, &self.gpu, shot.scene, last.as_ref(), &frame);
         frame.follow(shot, &params, last.as_ref(), resized.as_ref());
-        frame.dispatch.sheet_rows = frame.view.height;
+        frame.dispatch.strip_rows = frame.view.height;
 
         self.timings = Timings::default();
         let mut rec = Recorder::new(&self.gpu, &mut self.timings, interrupt);
@@ -204,25 +204,26 @@ impl Renderer {
         rec.bind(self.scene_depth.as_ref().map_or(Vec::new(), SceneTextures::bindings));
         self.lut_memory = rec.held();
 
-        let TemporalTargets { refined, current, before, now, composed, backdrop, scene_before, .. } = &*targets;
+        let TemporalTargets { ray_list, current, before, now, output, background_corners, scene_before, .. } =
+            &*targets;
         if let Some(old) = &resized {
             reproject::rescale(&mut rec, &frame, &old.before, before);
         }
         let index = last.as_ref().map_or(0, |last| last.index + 1);
-        let buffers = reproject::Buffers { refined, current, before, scene_before, now };
+        let buffers = reproject::Buffers { ray_list, current, before, scene_before, now };
         let follow = |rec: &mut Recorder<'_>| reproject::record(rec, &frame, &self.quality, index, &buffers);
         if frame.cloudless {
         } else if last.is_some() {
             follow(&mut rec);
         } else {
             rec.compile_ahead(follow);
-            reproject::begin(&mut rec, &frame, &self.quality, refined, now);
+            reproject::begin(&mut rec, &frame, &self.quality, ray_list, now);
         }
-        let parts = Parts { marched: &now.marched, backdrop, refined, out: composed };
+        let parts = Parts { cloud_buffers: &now.cloud_buffers, background_corners, ray_list, out: output };
         composite::record(&mut rec, &frame, &params, &parts, plan.by_cells);
         match screen {
-            Some(screen) => display::record(&mut rec, &frame, composed, screen),
-            None => rec.download(&composed.image, 0, 16 * count(self.size)),
+            Some(screen) => display::record(&mut rec, &frame, output, screen),
+            None => rec.download(&output.image, 0, 16 * count(self.size)),
         }
         let downloads = rec.submit()?;
         let image = downloads.first().map_or(Vec::new(), |image| image.numbers().to_vec());
@@ -261,7 +262,7 @@ impl Renderer {
     }
 
     /// How much each pixel of the last frame of [`Renderer::animate`] rests on, row by row, from 1, a guess from the rays
-    /// around it in that frame alone, to [`ROUND`], a ray of its own that has been followed since; between those, the mean of guesses
+    /// around it in that frame alone, to [`CYCLE`], a ray of its own that has been followed since; between those, the mean of guesses
     /// in so many frames. Empty where no frame was reprojected or could be: before the first, after a cut, without clouds, and
     /// where frames converge or are traced.
     pub fn history_length(&mut self) -> Result<Vec<u32>> {
@@ -278,7 +279,7 @@ impl Renderer {
         let lengths = rec.submit()?;
         let lengths: &[u32] = lengths[0].numbers();
         let spacing = grid::spacing(targets.sparse);
-        let unit = ROUND / grid::round(targets.sparse);
+        let unit = CYCLE / grid::cycle(targets.sparse);
         let at = |x: u32, y: u32| unit * lengths[(y / spacing * columns + x / spacing) as usize];
         Ok((0..height).flat_map(|y| (0..width).map(move |x| at(x, y))).collect())
     }

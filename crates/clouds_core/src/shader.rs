@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
-use crate::luts::{broad_weather, majorant, multiscatter, noise, shadow, sky, weather};
+use crate::luts::{large_scale_weather, majorant, multiscatter, noise, shadow, sky, weather};
 use crate::params::{self, Params, Quality};
 use crate::schema::{Block, wgsl_struct};
 use crate::uniforms::{Dispatch, Sky, View};
@@ -77,7 +77,7 @@ fn params_source() -> String {
 fn constants_source() -> String {
     let modules = [
         blue_noise::constants,
-        broad_weather::constants,
+        large_scale_weather::constants,
         camera::constants,
         color::constants,
         frame::constants,

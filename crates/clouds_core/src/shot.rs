@@ -50,7 +50,7 @@ impl<'a> Shot<'a> {
         frame.view.background = u32::from(self.background);
         frame.scene = self.scene.is_some();
         frame.view.scene_lit = u32::from(self.scene.is_some_and(|scene| scene.color.is_some()));
-        frame.beams = frame.has_beams(self.camera, &params);
+        frame.light_shafts = frame.has_light_shafts(self.camera, &params);
         Ok((frame, params))
     }
 }

@@ -14,7 +14,7 @@ pub(crate) fn of_picture(params: &Params, quality: &Quality, frame: &Frame, laye
     of_sky(params, quality).with(&[
         ("SUNLIT", on(frame.sunlit(params))),
         ("CAMERA", f64::from(frame.projection as u32)),
-        ("BEAMS", on(frame.beams)),
+        ("LIGHT_SHAFTS", on(frame.light_shafts)),
         ("SCENE", on(frame.scene)),
         ("SUBRAYS", on(params.volume.is_none() && frame.has_subrays())),
         ("SPARSE", on(frame.sparse)),
@@ -56,7 +56,7 @@ fn of_sky(params: &Params, quality: &Quality) -> Specialization {
         ("RAINY", on(params.is_rainy())),
         ("RAIN_SHAFTS", on(params.has_rain_shafts())),
         ("UPPER", on(params.has_upper_clouds())),
-        ("BROAD_WEATHER", on(params.has_broad_weather())),
+        ("LARGE_SCALE_WEATHER", on(params.has_large_scale_weather())),
         ("PROFILE_TABLE", on(params.clouds.profile.is_some() && !volume)),
         ("LIGHT_DETAIL", on(quality.cheap_light > 0.0)),
         ("LIGHT_CHEAP", on(cheap)),

@@ -4,11 +4,11 @@ use crate::frame::Frame;
 use crate::gpu::Bindings;
 use crate::gpu::Gpu;
 use crate::grid;
-use crate::passes::clouds::Marched;
-use crate::passes::composite::{Backdrop, Composed};
+use crate::passes::clouds::CloudBuffers;
+use crate::passes::composite::{Background, Output};
 use crate::passes::rays::Rays;
-use crate::passes::refine::Refined;
-use crate::passes::reproject::{Current, Followed};
+use crate::passes::refine::RayList;
+use crate::passes::reproject::{Current, HistoryBuffers};
 use crate::passes::{path, reference};
 use crate::plan::Integrator;
 use crate::scene_depth::SceneTextures;
@@ -18,10 +18,10 @@ pub(crate) struct StillTargets {
     size: [u32; 2],
     integrator: Integrator,
     sparse: bool,
-    pub refined: Refined,
-    pub marched: Marched,
-    pub composed: Composed,
-    pub backdrop: Backdrop,
+    pub ray_list: RayList,
+    pub cloud_buffers: CloudBuffers,
+    pub output: Output,
+    pub background_corners: Background,
     pub rays: Option<Rays>,
 }
 
@@ -37,17 +37,17 @@ impl StillTargets {
             size,
             integrator,
             sparse,
-            refined: Refined::new(gpu, known),
-            marched: Marched::new(gpu, known),
-            composed: Composed::new(gpu, pixels),
-            backdrop: Backdrop::new(gpu, size),
+            ray_list: RayList::new(gpu, known),
+            cloud_buffers: CloudBuffers::new(gpu, known),
+            output: Output::new(gpu, pixels),
+            background_corners: Background::new(gpu, size),
             rays: ray_bytes.map(|bytes| Rays::new(gpu, pixels, bytes)),
         }
     }
 
     /// Those of a strip: the same as before where it has room in them.
     pub fn fit<'a>(kept: &'a mut Option<Self>, gpu: &Gpu, frame: &Frame, integrator: Integrator) -> &'a Self {
-        let (sparse, [width, rows]) = (frame.sparse, [frame.view.width, frame.dispatch.sheet_rows]);
+        let (sparse, [width, rows]) = (frame.sparse, [frame.view.width, frame.dispatch.strip_rows]);
         let fits = |old: &Self| {
             (old.size[0], old.integrator, old.sparse) == (width, integrator, sparse) && old.size[1] >= rows
         };
@@ -60,8 +60,8 @@ impl StillTargets {
     /// What is kept on the device.
     pub fn bindings(&self) -> Bindings {
         let rays = self.rays.as_ref().map_or(Vec::new(), |rays| rays.bindings("rays"));
-        let Self { marched, refined, composed, backdrop, .. } = self;
-        [marched.bindings(), refined.bindings(), composed.bindings(), backdrop.bindings(), rays].concat()
+        let Self { cloud_buffers, ray_list, output, background_corners, .. } = self;
+        [cloud_buffers.bindings(), ray_list.bindings(), output.bindings(), background_corners.bindings(), rays].concat()
     }
 }
 
@@ -69,12 +69,12 @@ impl StillTargets {
 pub(crate) struct TemporalTargets {
     pub size: [u32; 2],
     pub sparse: bool,
-    pub refined: Refined,
+    pub ray_list: RayList,
     pub current: Current,
-    pub before: Followed,
-    pub now: Followed,
-    pub composed: Composed,
-    pub backdrop: Backdrop,
+    pub before: HistoryBuffers,
+    pub now: HistoryBuffers,
+    pub output: Output,
+    pub background_corners: Background,
     /// The user's scene in the frame before.
     pub scene_before: SceneTextures,
 }
@@ -87,21 +87,21 @@ impl TemporalTargets {
         Self {
             size,
             sparse,
-            refined: Refined::new(gpu, known),
+            ray_list: RayList::new(gpu, known),
             current: Current::new(gpu, cells),
-            before: Followed::new(gpu, known),
-            now: Followed::new(gpu, known),
-            composed: Composed::new(gpu, count(size)),
-            backdrop: Backdrop::new(gpu, size),
+            before: HistoryBuffers::new(gpu, known),
+            now: HistoryBuffers::new(gpu, known),
+            output: Output::new(gpu, count(size)),
+            background_corners: Background::new(gpu, size),
             scene_before: SceneTextures::new(gpu, 0, false),
         }
     }
 
     /// What is kept on the device.
     pub fn bindings(&self) -> Bindings {
-        let Self { refined, current, before, now, composed, backdrop, scene_before, .. } = self;
+        let Self { ray_list, current, before, now, output, background_corners, scene_before, .. } = self;
         let scene = vec![("scene_before", scene_before.depth())];
-        let ours = [current.bindings(), refined.bindings(), composed.bindings(), backdrop.bindings(), scene];
+        let ours = [current.bindings(), ray_list.bindings(), output.bindings(), background_corners.bindings(), scene];
         [ours.concat(), before.bindings(), now.bindings()].concat()
     }
 }

@@ -46,7 +46,7 @@ crate::params! {
         /// Pixels from one that its clouds were known at to the next.
         previous_spacing: u32 = 1;
         /// Frames in which each of those was marched once.
-        previous_round: u32 = 1;
+        previous_cycle: u32 = 1;
         /// How far the eye has moved since the frame before, m.
         eye_motion: [f32; 3] = [0.0, 0.0, 0.0];
         /// How far the wind has carried the clouds since the frame before, m.
@@ -90,9 +90,9 @@ crate::params! {
         /// 1 where its radiance is known.
         scene_lit: u32 = 0;
         /// Distance from which on rays may meet such air, m.
-        beam_start: f32 = 0.0;
+        shaft_start: f32 = 0.0;
         /// How much farther away the last of it is, m.
-        beam_length: f32 = 1.0;
+        shaft_length: f32 = 1.0;
     }
 }
 
@@ -215,9 +215,9 @@ crate::params! {
         /// How many columns they are.
         columns: u32 = 1;
         /// First row that the buffers hold: where this sheet begins (of the marched rows, in `march`).
-        sheet_row: u32 = 0;
+        strip_row: u32 = 0;
         /// Rows that they hold.
-        sheet_rows: u32 = 1;
+        strip_rows: u32 = 1;
         /// Every how many pixels one is marched, in both directions.
         stride: u32 = 1;
         /// Which of them, across.

@@ -8,7 +8,7 @@ use glam::{DVec2, DVec3};
 
 use crate::directions::compass;
 use crate::error::{Error, Result};
-use crate::params::{Drift, HighClouds, Params, UpperClouds, Wander, Wind};
+use crate::params::{Drift, HighClouds, Params, UpperClouds, Wind, Wander};
 use crate::schema::Block as _;
 
 /// How many slow turns a wander is the mean of.
@@ -76,7 +76,7 @@ impl Params {
             // To the bit, without a sum and a difference.
             return before.drift.clone();
         }
-        Carried::at(before, time).drift_of(self, time)
+        Advection::at(before, time).drift_of(self, time)
     }
 
     /// Whether what winds carry moves as in another sky.
@@ -92,7 +92,7 @@ impl Params {
 
 /// How far each wind has carried what it carries from one time to another, m; or how fast it does, m/s.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Carried {
+pub struct Advection {
     /// The base shapes, east and north, as the next four.
     pub shape: DVec2,
     /// The detail.
@@ -114,10 +114,10 @@ pub struct Carried {
     pub swings: f64,
 }
 
-/// Numbers of [`Carried`] in a row.
+/// Numbers of [`Advection`] in a row.
 pub const NUMBERS: usize = 15;
 
-impl Carried {
+impl Advection {
     /// By one sky's winds.
     pub fn new(params: &Params, from: f64, to: f64) -> Self {
         let (wind, upper, high) = (&params.wind, &params.upper_clouds, &params.high_clouds);
@@ -125,7 +125,7 @@ impl Carried {
         // Difference by difference: the way to either time may be too long for f64 where the way between is not.
         let seconds = DVec2::new(to - from, 0.0) + (wander.way(swings, to) - wander.way(swings, from));
         // Of a wind that does not wander exactly its speed times the time.
-        let by = |direction: f32, speed: f32| turned(compass(f64::from(direction)) * f64::from(speed), seconds);
+        let by = |direction: f32, speed: f32| rotate_by(compass(f64::from(direction)) * f64::from(speed), seconds);
         Self {
             shape: by(wind.direction, wind.speed),
             detail: by(wind.detail_direction, wind.detail_speed),
@@ -180,7 +180,7 @@ impl Carried {
     fn blown(mut self, gust: DVec2) -> Self {
         let Self { shape, detail, weather, upper, upper_detail, high, .. } = &mut self;
         for wind in [shape, detail, weather, upper, upper_detail, high] {
-            *wind = turned(*wind, gust);
+            *wind = rotate_by(*wind, gust);
         }
         self
     }
@@ -192,7 +192,7 @@ impl Carried {
     }
 }
 
-impl From<[f64; NUMBERS]> for Carried {
+impl From<[f64; NUMBERS]> for Advection {
     fn from(numbers: [f64; NUMBERS]) -> Self {
         let pair = |index: usize| DVec2::new(numbers[2 * index], numbers[2 * index + 1]);
         let [.., rise, evolution, swings] = numbers;
@@ -201,7 +201,7 @@ impl From<[f64; NUMBERS]> for Carried {
     }
 }
 
-impl From<&Drift> for Carried {
+impl From<&Drift> for Advection {
     fn from(drift: &Drift) -> Self {
         let Drift { shape, detail, weather, upper, upper_detail, high, rise, evolution, swings } = *drift;
         let [shape, detail, weather] = [shape, detail, weather].map(DVec2::from);
@@ -210,9 +210,9 @@ impl From<&Drift> for Carried {
     }
 }
 
-impl From<&Carried> for Drift {
-    fn from(carried: &Carried) -> Self {
-        let Carried { shape, detail, weather, upper, upper_detail, high, rise, evolution, swings } = *carried;
+impl From<&Advection> for Drift {
+    fn from(carried: &Advection) -> Self {
+        let Advection { shape, detail, weather, upper, upper_detail, high, rise, evolution, swings } = *carried;
         let [shape, detail, weather] = [shape, detail, weather].map(|v| v.to_array());
         let [upper, upper_detail, high] = [upper, upper_detail, high].map(|v| v.to_array());
         Self { shape, detail, weather, upper, upper_detail, high, rise, evolution, swings }
@@ -220,7 +220,7 @@ impl From<&Carried> for Drift {
 }
 
 /// The product of two complex numbers.
-fn turned(a: DVec2, b: DVec2) -> DVec2 {
+fn rotate_by(a: DVec2, b: DVec2) -> DVec2 {
     DVec2::new(a.x * b.x - a.y * b.y, a.y * b.x + a.x * b.y)
 }
 
@@ -255,7 +255,7 @@ fn gauss(from: f64, to: f64) -> impl Iterator<Item = (f64, f64)> {
 impl Between<'_> {
     /// The integral of all velocities and rates from the start to a time of the span, for a wander that is `swings` ahead at
     /// the start.
-    pub fn carried(&self, swings: f64, time: f64) -> Result<Carried> {
+    pub fn carried(&self, swings: f64, time: f64) -> Result<Advection> {
         let [start, end] = self.span;
         let gusty = self.skies.iter().any(|sky| sky.wander.wind > 0.0);
         let periods =
@@ -270,7 +270,7 @@ impl Between<'_> {
         });
         let seconds = end - start;
         let last = ((time - start) / seconds).clamp(0.0, 1.0);
-        let mut sum = Carried { swings, ..Carried::default() };
+        let mut sum = Advection { swings, ..Advection::default() };
         let mut at = 0.0;
         while at < last {
             let next = self.piece(at, gusty).min(last);
@@ -313,7 +313,7 @@ impl Between<'_> {
     }
 
     /// Velocities, and what else goes by a second, where there is so much of the second sky; without gusts.
-    fn rates(&self, share: f64) -> Carried {
+    fn rates(&self, share: f64) -> Advection {
         let line = |of: &dyn Fn(&Params) -> f32| {
             let [a, b] = self.skies.map(|sky| f64::from(of(sky)));
             a + share * (b - a)
@@ -324,7 +324,7 @@ impl Between<'_> {
         };
         let (speed, detail_speed) = (line(&|sky| sky.wind.speed), line(&|sky| sky.wind.detail_speed));
         let (upper, upper_speed) = (toward(&|sky| sky.upper_clouds.direction), line(&|sky| sky.upper_clouds.speed));
-        Carried {
+        Advection {
             shape: speed * toward(&|sky| sky.wind.direction),
             detail: detail_speed * toward(&|sky| sky.wind.detail_direction),
             weather: line(&|sky| sky.wind.weather_speed) * toward(&|sky| sky.wind.weather_direction),
@@ -342,7 +342,7 @@ impl Between<'_> {
 #[derive(Default)]
 pub(crate) struct Going {
     /// The sky that was asked for last, its time, and what it lacked.
-    last: Option<(Params, f64, Carried)>,
+    last: Option<(Params, f64, Advection)>,
 }
 
 /// Longest time between two shots in which a sky goes on, s; as for the rest of the history.
@@ -354,9 +354,9 @@ impl Going {
     /// (`Keyframes`, `Params::after`) need nothing; nor does what comes after a cut.
     pub fn on(&mut self, params: &Params, time: f64, cut: bool) -> Params {
         let last = self.last.take().filter(|(_, then, _)| !cut && (time - then).abs() <= LONGEST_SHOT);
-        let mut lacked = last.as_ref().map_or_else(Carried::default, |(.., lacked)| *lacked);
-        let with = |params: &Params, lacked: &Carried| {
-            let drift = Drift::from(&Carried::from(&params.drift).plus(lacked, 1.0));
+        let mut lacked = last.as_ref().map_or_else(Advection::default, |(.., lacked)| *lacked);
+        let with = |params: &Params, lacked: &Advection| {
+            let drift = Drift::from(&Advection::from(&params.drift).plus(lacked, 1.0));
             Params { drift, ..params.clone() }
         };
         if let Some((before, then, _)) = &last
@@ -364,14 +364,14 @@ impl Going {
             && !params.has_winds_of(before)
         {
             let drift = params.after(&with(before, &lacked), 0.5 * (time + then));
-            lacked = Carried::from(&drift).plus(&Carried::from(&params.drift), -1.0);
+            lacked = Advection::from(&drift).plus(&Advection::from(&params.drift), -1.0);
         }
         let mut now = with(params, &lacked);
         let allowed =
             |(index, field): (usize, &crate::schema::Field)| field.check("drift", &now.drift.get(index)).is_ok();
         if !Drift::FIELDS.iter().enumerate().all(allowed) {
             // After a time that is beyond all sense.
-            (now, lacked) = (params.clone(), Carried::default());
+            (now, lacked) = (params.clone(), Advection::default());
         }
         self.last = Some((params.clone(), time, lacked));
         now
@@ -408,7 +408,7 @@ mod tests {
 
     /// Displacements of all winds, in the order of their mean velocities.
     fn carried(params: &Params, from: f64, to: f64) -> [DVec2; 4] {
-        let Carried { shape, detail, weather, high, .. } = Carried::new(params, from, to);
+        let Advection { shape, detail, weather, high, .. } = Advection::new(params, from, to);
         [shape, detail, weather, high]
     }
 
@@ -435,8 +435,8 @@ mod tests {
         let params = Params { wind: Wind { direction: 90.0, updraft: 2.0, ..Wind::default() }, ..Params::default() };
         for time in [0.0, 1.0, -3600.0, 2.6e6, 1e12] {
             assert_eq!(carried(&params, 0.0, time), means(&params).map(|mean| mean * time));
-            assert_eq!(Carried::new(&params, 0.0, time).shape, DVec2::new(8.0 * time, 0.0));
-            assert_eq!(Carried::new(&params, 0.0, time).rise, 2.0 * time);
+            assert_eq!(Advection::new(&params, 0.0, time).shape, DVec2::new(8.0 * time, 0.0));
+            assert_eq!(Advection::new(&params, 0.0, time).rise, 2.0 * time);
         }
     }
 
@@ -512,7 +512,7 @@ mod tests {
     fn any_time_is_a_time() {
         let params = wandering(1.0, 1);
         for time in [1e-300, -1e300, f64::MAX, f64::MIN] {
-            assert!(Carried::new(&params, time, time).drift() == DVec3::ZERO);
+            assert!(Advection::new(&params, time, time).drift() == DVec3::ZERO);
             assert!((0.0..=1.0).contains(&params.at(time).clouds.coverage));
         }
     }

@@ -2,7 +2,7 @@
 
 use clouds_core::color::LUMINANCE;
 use clouds_core::picture::Picture;
-use clouds_core::renderer::ROUND;
+use clouds_core::renderer::CYCLE;
 
 /// Density evaluations shown as white, as in figure 39 of thesis2018.
 pub const WHITE_EVALUATIONS: f32 = 500.0;
@@ -85,7 +85,7 @@ pub fn history_pixels(lengths: &[u32], [width, height]: [u32; 2]) -> Vec<u8> {
     if lengths.is_empty() {
         return rgba8([0.0; 3]).repeat(width as usize * height as usize);
     }
-    lengths.iter().flat_map(|length| rgba8(heat_map(*length as f32 / ROUND as f32))).collect()
+    lengths.iter().flat_map(|length| rgba8(heat_map(*length as f32 / CYCLE as f32))).collect()
 }
 
 /// Heat map over 0 to 1: black, red, yellow, white.

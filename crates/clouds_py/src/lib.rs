@@ -15,7 +15,7 @@ use clouds_core::params::{Params, Quality};
 use clouds_core::renderer::Renderer as CoreRenderer;
 use clouds_core::scene_depth::SceneDepth;
 use clouds_core::schema::Value;
-use clouds_core::wind::{Between, Carried, NUMBERS};
+use clouds_core::wind::{Advection, Between, NUMBERS};
 use clouds_core::{DensityGrid as CoreGrid, Error, Result, cache, color, files, params, schema};
 use glam::DVec3;
 use numpy::{PyArray1, PyArrayMethods as _, PyReadonlyArrayDyn, PyUntypedArrayMethods as _};
@@ -664,14 +664,14 @@ fn drift_after<'py>(params: &Bound<'py, PyAny>, before: &Bound<'py, PyAny>, time
 fn drift_of<'py>(params: &Bound<'py, PyAny>, time: f64, carried: [f64; NUMBERS]) -> PyResult<Bound<'py, PyDict>> {
     let py = params.py();
     let params = params_from_python(params)?;
-    let carried = Carried::from(carried).plus(&Carried::from(&params.drift), 1.0);
+    let carried = Advection::from(carried).plus(&Advection::from(&params.drift), 1.0);
     fields(py, &carried.drift_of(&params, time))
 }
 
 /// How far a sky has carried things from 0 s to a time, beside its drift.
 #[pyfunction]
 fn carried(params: &Bound<'_, PyAny>, time: f64) -> PyResult<[f64; NUMBERS]> {
-    Ok(Carried::new(&params_from_python(params)?, 0.0, time).numbers())
+    Ok(Advection::new(&params_from_python(params)?, 0.0, time).numbers())
 }
 
 /// How far things are carried on the way from one sky to another, from `start` to `time`, by a wander that is `swings` ahead.

@@ -5,7 +5,7 @@
 #import atmosphere
 #import aerial
 #import high_light
-#import lattice
+#import sample_grid
 #import scene_depth
 #import ground_shadow
 
@@ -34,7 +34,7 @@ fn composite(
     @builtin(num_workgroups) groups: vec3u,
     @builtin(local_invocation_id) local: vec3u,
 ) {
-    let id = GRID_GROUP * spread_rows(group.xy, groups.xy) + local.xy;
+    let id = GRID_GROUP * swizzle_rows(group.xy, groups.xy) + local.xy;
     if id.x >= frame.view.width || id.y >= dispatch.rows {
         return;
     }
@@ -52,7 +52,7 @@ fn composite_discs(@builtin(global_invocation_id) id: vec3u) {
 
 // A pixel of the picture.
 fn compose(pixel: vec2u) {
-    let index = (pixel.y - dispatch.sheet_row) * frame.view.width + pixel.x;
+    let index = (pixel.y - dispatch.strip_row) * frame.view.width + pixel.x;
     let view = view_direction(vec2f(pixel) + 0.5);
     if view.w == 0.0 {
         image[index] = vec4f(0.0);
@@ -62,7 +62,7 @@ fn compose(pixel: vec2u) {
         }
         return;
     }
-    let at = vec2u(pixel.x, pixel.y - dispatch.sheet_row);
+    let at = vec2u(pixel.x, pixel.y - dispatch.strip_row);
     let here = marched_layer(at / TILE, sparse_cell(at / TILE), at.y % TILE * TILE + at.x % TILE);
     let scene = scene_distance(pixel);
     var sight = sight_of(view.xyz, vec2f(pixel), pixel, scene, here);
@@ -70,7 +70,7 @@ fn compose(pixel: vec2u) {
         // As `discs` has left it there.
         sight.background += select(image[index].rgb, vec3f(0.0), scene < NO_SCENE);
     }
-    put(index, sight);
+    write_pixel(index, sight);
 }
 
 // Radiance of the air in a wide pixel, the mean: the glow around the sun is narrower than it. On the side of the horizon that its
@@ -136,7 +136,7 @@ fn marched_layer(cell: vec2u, sparse: SparseCell, i: u32) -> Layer {
     return Layer(cloud.rgb, cloud.a, max(cloud_depth[index], 0.0));
 }
 
-fn put(index: u32, sight: Sight) {
+fn write_pixel(index: u32, sight: Sight) {
     if LAYERS {
         sky[index] = vec4f(sight.background, 1.0);
         let covered = 1.0 - sight.seen.transmittance;
@@ -162,13 +162,13 @@ fn corner_index(corner: vec2u) -> u32 {
 
 // What is behind the marched clouds, and the user's scene, at the corners of the cells of a sheet and of those around it.
 @compute @workgroup_size(8, 8)
-fn backdrop(@builtin(global_invocation_id) id: vec3u) {
+fn background_corners(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= cell_columns() + 3u || id.y >= (dispatch.rows + TILE - 1u) / TILE + 3u {
         return;
     }
-    let pixel = (vec2f(id.xy) - 1.0) * f32(TILE) + vec2f(0.0, f32(dispatch.sheet_row));
+    let pixel = (vec2f(id.xy) - 1.0) * f32(TILE) + vec2f(0.0, f32(dispatch.strip_row));
     let view = view_direction(pixel + 0.5);
-    let sight = sight_of(view.xyz, pixel, vec2u(0u, dispatch.sheet_row), NO_SCENE, Layer(vec3f(0.0), 1.0, 0.0));
+    let sight = sight_of(view.xyz, pixel, vec2u(0u, dispatch.strip_row), NO_SCENE, Layer(vec3f(0.0), 1.0, 0.0));
     let ground = hit_sphere(view.xyz, frame.view.power_ground);
     var layer = vec4f(sight.seen.radiance, sight.seen.transmittance);
     var distance = sight.seen.distance;
@@ -226,12 +226,12 @@ fn composite_cells(
     @builtin(num_workgroups) groups: vec3u,
     @builtin(local_invocation_id) local: vec3u,
 ) {
-    let id = 8u * spread_rows(group.xy, groups.xy) + local.xy;
+    let id = 8u * swizzle_rows(group.xy, groups.xy) + local.xy;
     let columns = cell_columns();
     if id.x >= columns || id.y >= (dispatch.rows + TILE - 1u) / TILE {
         return;
     }
-    let first = vec2u(id.x * TILE, dispatch.sheet_row + id.y * TILE);
+    let first = vec2u(id.x * TILE, dispatch.strip_row + id.y * TILE);
     // Written out: lavapipe keeps in memory what a loop indexes.
     let c0 = corner_index(id.xy + 1u);
     let c1 = c0 + 1u;
@@ -272,13 +272,13 @@ fn composite_cells(
         hidden = hidden && (!SPARSE || all(vec4f(c[0].a, c[1].a, c[2].a, c[3].a) == vec4f(0.0)));
     }
     if !SPARSE && !LAYERS && !CLOUDLESS {
-        let last = vec2u(frame.view.width, dispatch.sheet_row + dispatch.rows) - 1u;
+        let last = vec2u(frame.view.width, dispatch.strip_row + dispatch.rows) - 1u;
         var i = 0u;
         // It leaves soon: most cells show something, and those that do not ask are never hidden. Once false, it stays so,
         // whatever lavapipe computes for a cell that has left.
         loop {
             let pixel = min(cell_pixel(first, i), last);
-            hidden = hidden && clouds[(pixel.y - dispatch.sheet_row) * frame.view.width + pixel.x].a == 0.0;
+            hidden = hidden && clouds[(pixel.y - dispatch.strip_row) * frame.view.width + pixel.x].a == 0.0;
             i++;
             if !hidden || i == TILE * TILE {
                 break;
@@ -292,7 +292,7 @@ fn composite_cells(
     let smooth_cell = !fine_high && !fine_ground;
     var i = 0u;
     loop {
-        if smooth_cell && in_sheet(first, i) {
+        if smooth_cell && in_strip(first, i) {
             let layer = layers * corner_shares(i);
             let sky = behind * corner_shares(i);
             // Before the ground there is the lack of light in the shadows; and what is hidden may have both at its corners.
@@ -300,7 +300,7 @@ fn composite_cells(
             if hidden {
                 high = Layer(vec3f(0.0), 1.0, 0.0);
             }
-            put_behind(sheet_index(first, i), marched_layer(id.xy, sparse, i), high, sky.rgb + select(vec3f(0.0), layer.rgb, grounded));
+            put_behind(strip_index(first, i), marched_layer(id.xy, sparse, i), high, sky.rgb + select(vec3f(0.0), layer.rgb, grounded));
         }
         i++;
         if i >= select(1u, TILE * TILE, smooth_cell) {
@@ -310,13 +310,13 @@ fn composite_cells(
     if HIGH {
         var n = 0u;
         loop {
-            if fine_high && in_sheet(first, n) {
+            if fine_high && in_strip(first, n) {
                 let direction = view_direction(vec2f(cell_pixel(first, n)) + 0.5).xyz;
                 let turned = seen_turn(direction, vec2f(cell_pixel(first, n)));
                 let layer = high_layer(direction, hit_sphere(direction, frame.view.power_high).far, true, turned);
                 let shares = corner_shares(n);
                 let before = Air((air * shares).rgb, (haze * shares).rgb);
-                put_behind(sheet_index(first, n), marched_layer(id.xy, sparse, n), through_air(layer, before), (behind * shares).rgb);
+                put_behind(strip_index(first, n), marched_layer(id.xy, sparse, n), through_air(layer, before), (behind * shares).rgb);
             }
             n++;
             if n >= select(1u, TILE * TILE, fine_high) {
@@ -327,13 +327,13 @@ fn composite_cells(
     if GROUND_SHADOW {
         var n = 0u;
         loop {
-            if fine_ground && in_sheet(first, n) {
+            if fine_ground && in_strip(first, n) {
                 let direction = view_direction(vec2f(cell_pixel(first, n)) + 0.5).xyz;
                 let p = hit_sphere(direction, frame.view.power_ground).near * direction;
                 let sun = ground_sun(p, cos_zenith_at(p, frame.sky.sun_direction));
                 let shares = corner_shares(n);
                 let lit = (behind * shares).rgb - (1.0 - sun) * (air * shares).rgb;
-                put_behind(sheet_index(first, n), marched_layer(id.xy, sparse, n), Layer(vec3f(0.0), 1.0, 0.0), lit);
+                put_behind(strip_index(first, n), marched_layer(id.xy, sparse, n), Layer(vec3f(0.0), 1.0, 0.0), lit);
             }
             n++;
             if n >= select(1u, TILE * TILE, fine_ground) {
@@ -371,13 +371,13 @@ fn cell_pixel(first: vec2u, i: u32) -> vec2u {
     return first + vec2u(i % TILE, i / TILE);
 }
 
-fn in_sheet(first: vec2u, i: u32) -> bool {
-    return all(cell_pixel(first, i) < vec2u(frame.view.width, dispatch.sheet_row + dispatch.rows));
+fn in_strip(first: vec2u, i: u32) -> bool {
+    return all(cell_pixel(first, i) < vec2u(frame.view.width, dispatch.strip_row + dispatch.rows));
 }
 
-fn sheet_index(first: vec2u, i: u32) -> u32 {
+fn strip_index(first: vec2u, i: u32) -> u32 {
     let pixel = cell_pixel(first, i);
-    return (pixel.y - dispatch.sheet_row) * frame.view.width + pixel.x;
+    return (pixel.y - dispatch.strip_row) * frame.view.width + pixel.x;
 }
 
 // Shares of a cell's corners in a pixel.
@@ -404,12 +404,12 @@ fn put_behind(index: u32, here: Layer, high: Layer, background: vec3f) {
             );
         }
     }
-    put(index, sight_to(seen, background));
+    write_pixel(index, sight_to(seen, background));
 }
 
 // How near the user's scene comes in a cell.
 fn nearest_scene(first: vec2u) -> f32 {
-    let last = vec2u(frame.view.width, dispatch.sheet_row + dispatch.rows) - 1u;
+    let last = vec2u(frame.view.width, dispatch.strip_row + dispatch.rows) - 1u;
     var nearest = NO_SCENE;
     for (var i = 0u; i < TILE * TILE; i++) {
         nearest = min(nearest, scene_distance(min(cell_pixel(first, i), last)));
@@ -428,7 +428,7 @@ fn composite_list(@builtin(global_invocation_id) id: vec3u) {
     let i = number % (TILE * TILE);
     let pixel = TILE * vec2u(cell % cell_columns(), cell / cell_columns()) + vec2u(i % TILE, i / TILE);
     if all(pixel < vec2u(frame.view.width, dispatch.rows)) {
-        compose(pixel + vec2u(0u, dispatch.sheet_row));
+        compose(pixel + vec2u(0u, dispatch.strip_row));
     }
 }
 
@@ -452,12 +452,12 @@ fn sight_to(seen: Layer, background: vec3f) -> Sight {
 // pixel that looks there.
 fn sight_of(direction: vec3f, corner: vec2f, pixel: vec2u, scene: f32, here: Layer) -> Sight {
     let ground = hit_sphere(direction, frame.view.power_ground);
-    var way = Way(0.0, 0.0, ground.enters);
+    var way = AirSegment(0.0, 0.0, ground.enters);
     var texels = AirTexels(vec2f(0.0), vec2f(0.0));
     var sky_behind = vec3f(0.0);
     var air = Air(vec3f(1.0), vec3f(0.0));
     if AIR {
-        way = air_way(direction);
+        way = air_segment(direction);
         texels = air_texels(direction);
         sky_behind = wide_sky(direction, corner, ground.enters);
         air = whole_air(direction, way, texels, sky_behind);
@@ -532,7 +532,7 @@ fn ground_sun(p: vec3f, mu: f32) -> f32 {
 }
 
 // The air before a distance on a ray, if there is any.
-fn air_to(direction: vec3f, distance: f32, way: Way, texels: AirTexels, sky: vec3f) -> Air {
+fn air_to(direction: vec3f, distance: f32, way: AirSegment, texels: AirTexels, sky: vec3f) -> Air {
     if AIR {
         return air_before(direction, distance, way, texels, sky);
     }

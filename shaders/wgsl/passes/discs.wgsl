@@ -11,6 +11,6 @@ fn discs(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let pixel = vec2u((dispatch.first_column + id.x) % frame.view.width, dispatch.first_row + id.y);
-    let index = (pixel.y - dispatch.sheet_row) * frame.view.width + pixel.x;
+    let index = (pixel.y - dispatch.strip_row) * frame.view.width + pixel.x;
     image[index] = vec4f(discs_in_pixel(pixel), 0.0);
 }

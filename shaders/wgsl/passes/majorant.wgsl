@@ -44,7 +44,7 @@ fn majorant_weather(@builtin(global_invocation_id) id: vec3u) {
             least = min(least, texel);
         }
     }
-    if BROAD_WEATHER {
+    if LARGE_SCALE_WEATHER {
         most = saturate(most + frame.sky.broad_most);
         least = saturate(least - frame.sky.broad_most);
     }

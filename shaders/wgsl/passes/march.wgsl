@@ -18,7 +18,7 @@ fn march(
     if id.x >= dispatch.march_width || id.y >= dispatch.rows {
         return;
     }
-    march_cell((dispatch.first_row - dispatch.sheet_row + id.y) * dispatch.march_width + id.x, EVERYWHERE);
+    march_cell((dispatch.first_row - dispatch.strip_row + id.y) * dispatch.march_width + id.x, EVERYWHERE);
 }
 
 // Marches the pixels of a list (passes/refine).
@@ -28,7 +28,7 @@ fn march_list(
     @builtin(num_workgroups) groups: vec3u,
     @builtin(local_invocation_id) local: vec3u,
 ) {
-    let number = dispatch.first_ray + LIST_GROUP * spread(group.x, groups.x) + local.x;
+    let number = dispatch.first_ray + LIST_GROUP * swizzle_workgroup(group.x, groups.x) + local.x;
     if number >= listed.w {
         return;
     }
@@ -45,7 +45,7 @@ const NOWHERE = vec2f(1e30, 0.0);
 
 // Marches the ray of a cell of the sheet within a span, and returns the span of its clouds.
 fn march_cell(index: u32, within: vec2f) -> vec2f {
-    let cell = vec2u(index % dispatch.march_width, dispatch.sheet_row + index / dispatch.march_width);
+    let cell = vec2u(index % dispatch.march_width, dispatch.strip_row + index / dispatch.march_width);
     let pixel = marched_pixel(cell);
     let view = view_direction(vec2f(pixel) + 0.5);
     var cloud = Cloud(vec3f(0.0), 1.0, -1.0, NOWHERE);
@@ -168,7 +168,7 @@ struct Sample {
     width: f32, // a pixel across, or a good part of the step along the ray, whichever is more
 }
 
-fn march_sample(s: Stretches, steps: Steps, direction: vec3f, offset: f32, i: u32, pixel_size: f32) -> Sample {
+fn march_sample(s: Segments, steps: Steps, direction: vec3f, offset: f32, i: u32, pixel_size: f32) -> Sample {
     let begin = step_distance(steps, f32(i));
     let length = select((1.0 / steps.growth + begin) * steps.ratio, steps.equal, steps.growth == 0.0);
     let from_start = begin + offset * length;
@@ -189,7 +189,7 @@ struct Group {
 
 // Their place is where most of them is: a sample that outweighs all before it has its own, or a veil before a cloud would
 // move it into the gap between.
-fn with_sample(group: Group, weight: f32, opacity: f32, at: Sample, column: Column) -> Group {
+fn with_sample(group: Group, weight: f32, opacity: f32, at: Sample, column: WeatherSample) -> Group {
     let here = vec3f(at.t, column.precipitation, ambient_share(column));
     let before = vec3f(group.distance, group.precipitation, group.above);
     let total = group.weight + weight;
@@ -243,7 +243,7 @@ fn ray_leaps(direction: vec3f, medium: u32) -> Leaps {
 // The steps from a point without cloud to where to look next: `big_step` of them, or more the more the shape lacks, as the
 // noise changes no faster than so much in a metre (Hart 1996, "sphere tracing", with a slope that is measured, not a bound).
 // Its threshold is what the profile lets through, here and, with none, at any height. Not to where another medium may be.
-fn steps_to_next(steps: Steps, direction: vec3f, column: Column, noise: f32, at: Sample) -> u32 {
+fn steps_to_next(steps: Steps, direction: vec3f, column: WeatherSample, noise: f32, at: Sample) -> u32 {
     let big = f32(params.quality.big_step);
     if VOLUME {
         return params.quality.big_step;
@@ -300,8 +300,8 @@ fn way_to_decks(direction: vec3f, leap: f32, at: Sample) -> f32 {
 const LONGEST_LEAP = 16.0;
 
 fn march_ray(direction: vec3f, turned: Turn, limit: f32, offset: f32, within: vec2f, rays: f32) -> Cloud {
-    let stretches = stretches_before(cloud_stretches(direction), limit);
-    let length = stretches.first + stretches.second;
+    let segments = segments_before(cloud_segments(direction), limit);
+    let length = segments.first + segments.second;
     // The optical depth is summed, not the transmittance multiplied: a thousand factors of almost 1 are all 1, or all
     // 6e-8 less.
     var optical_depth = 0.0;
@@ -309,10 +309,10 @@ fn march_ray(direction: vec3f, turned: Turn, limit: f32, offset: f32, within: ve
     if length <= 0.0 || (!VOLUME && !UPPER && params.clouds.coverage <= 0.0) {
         return Cloud(vec3f(0.0), 1.0, -1.0, NOWHERE);
     }
-    let steps = ray_steps(stretches.start, length, direction, rays);
+    let steps = ray_steps(segments.start, length, direction, rays);
     let pixel_size = pixel_width(direction);
     let sunlit = is_sunlit();
-    let nodes = ray_nodes(stretches.start, stretch_distance(stretches, length) - stretches.start);
+    let nodes = aerial_points(segments.start, stretch_distance(segments, length) - segments.start);
 
     var sum = Gathered();
 
@@ -326,7 +326,7 @@ fn march_ray(direction: vec3f, turned: Turn, limit: f32, offset: f32, within: ve
     var leapt = big; // steps before this one that have been leapt over, and one
     // The way to the first cloud has a loop of its own, without what is for clouds: that is a third of a turn.
     loop {
-        let at = march_sample(stretches, steps, direction, offset, i, pixel_size);
+        let at = march_sample(segments, steps, direction, offset, i, pixel_size);
         let column = cloud_column(at.p, at.altitude);
         let noise = base_noise(column);
         if !(shape_in(column, noise) <= 0.0) {
@@ -352,7 +352,7 @@ fn march_ray(direction: vec3f, turned: Turn, limit: f32, offset: f32, within: ve
     // `fair_weather` in `draft` take 45 turns, and light 3; where light was looked for at each sample, 86 and 16.
     loop {
         loop {
-            let at = march_sample(stretches, steps, direction, offset, i, pixel_size);
+            let at = march_sample(segments, steps, direction, offset, i, pixel_size);
             let column = cloud_column(at.p, at.altitude);
             let noise = base_noise(column);
             let shape = shape_in(column, noise);

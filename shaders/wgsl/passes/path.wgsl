@@ -26,7 +26,7 @@ const SHORTEST = 1e-2;
 // 1e8 / m) or where clouds are a metre thick, paths must end too.
 const MOST_TURNS = 1u << 20u;
 // Below it a path goes on by chance alone, with the weight of those that end (Russian roulette).
-const FAINT = 0.1;
+const ROULETTE_THRESHOLD = 0.1;
 
 @compute @workgroup_size(64)
 fn path(@builtin(global_invocation_id) id: vec3u) {
@@ -34,7 +34,7 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let index = active_rays[id.x];
-    let pixel = vec2u(index % frame.view.width, dispatch.sheet_row + index / frame.view.width);
+    let pixel = vec2u(index % frame.view.width, dispatch.strip_row + index / frame.view.width);
     let middle = view_direction(vec2f(pixel) + 0.5);
     let rays = rays_through(middle.xyz);
     let seen = seen_turn(middle.xyz, vec2f(pixel));
@@ -59,13 +59,13 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
             ray.throughput = vec3f(1.0);
             ray.light = vec3f(0.0);
             ray.scatterings = 0u;
-            ray.draws = 0u;
+            ray.random_dimension = 0u;
             ray.stage = FLIGHT;
         }
         let u = draw(&ray, pixel);
 
         // A step: to a collision that is real or not, or as far as the majorant holds.
-        let s = Stretches(ray.flight.x, ray.flight.y, ray.flight.z, ray.flight.w);
+        let s = Segments(ray.flight.x, ray.flight.y, ray.flight.z, ray.flight.w);
         let length = s.first + s.second;
         let direction = select(frame.sky.sun_direction, ray.direction, ray.stage == FLIGHT);
         let here = ray.origin + stretch_distance(s, ray.x) * direction;
@@ -88,7 +88,7 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
         let real = select(0.0, saturate(density / max(majorant.density, 1e-30)), collides);
         let ends = ray.x >= length;
 
-        if ray.draws > MOST_TURNS {
+        if ray.random_dimension > MOST_TURNS {
             ray = path_ended(ray);
         } else if ray.stage == FLIGHT {
             if real > u.y {
@@ -97,7 +97,7 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
                 ray.distance += select(0.0, t, ray.scatterings == 1u);
                 if AIR && ray.scatterings == 1u {
                     // The rest of the path is seen through the air.
-                    let way = air_way(direction);
+                    let way = air_segment(direction);
                     let air = air_before(direction, t, way, air_texels(direction), sky_radiance(direction));
                     ray.throughput *= air.transmittance;
                     ray.light = air.radiance;
@@ -121,8 +121,8 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
             }
         } else {
             ray.shadow *= 1.0 - real;
-            if ray.shadow < FAINT && ray.shadow > 0.0 && real > 0.0 {
-                ray.shadow = select(0.0, FAINT, u.y * FAINT < ray.shadow);
+            if ray.shadow < ROULETTE_THRESHOLD && ray.shadow > 0.0 && real > 0.0 {
+                ray.shadow = select(0.0, ROULETTE_THRESHOLD, u.y * ROULETTE_THRESHOLD < ray.shadow);
             }
             if ends || ray.shadow <= 0.0 {
                 ray.light += ray.shadow * ray.sunlight;
@@ -141,9 +141,9 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
 
 // Three random numbers in [0, 1), never the same for two pixels, paths or turns.
 fn draw(ray: ptr<function, PathRay>, pixel: vec2u) -> vec3f {
-    (*ray).draws += 1u;
+    (*ray).random_dimension += 1u;
     let number = pixel.y * frame.view.width + pixel.x;
-    return random3(vec3u(number, frame.view.first_sample + (*ray).done, (*ray).draws), 0u);
+    return random3(vec3u(number, frame.view.first_sample + (*ray).done, (*ray).random_dimension), 0u);
 }
 
 fn sun_at(p: vec3f) -> vec3f {
@@ -154,19 +154,19 @@ fn sun_at(p: vec3f) -> vec3f {
 }
 
 fn view_flight(view: vec4f, limit: f32) -> vec4f {
-    let s = stretches_before(cloud_stretches(view.xyz), limit);
+    let s = segments_before(cloud_segments(view.xyz), limit);
     let clear = view.w == 0.0 || (!VOLUME && !UPPER && params.clouds.coverage <= 0.0);
     return select(vec4f(s.start, s.first, s.gap, s.second), vec4f(0.0), clear);
 }
 
-// The stretches of a flight that starts at a point, to the ground at most.
+// The segments of a flight that starts at a point, to the ground at most.
 fn flight_from(p: vec3f, direction: vec3f) -> vec4f {
     let ground = hit_ground_from(p, direction);
     var s = cloud_stretches_from(p, direction);
     if ground.enters {
         let first = clamp(ground.near - s.start, 0.0, s.first);
         let second = clamp(ground.near - s.start - s.first - s.gap, 0.0, s.second);
-        s = Stretches(s.start, first, s.gap, second);
+        s = Segments(s.start, first, s.gap, second);
     }
     return vec4f(s.start, s.first, s.gap, s.second);
 }
@@ -176,11 +176,11 @@ fn scattered_on(given: PathRay, pixel: vec2u) -> PathRay {
     var ray = given;
     let u = draw(&ray, pixel);
     let brightest = max(max(ray.throughput.r, ray.throughput.g), ray.throughput.b);
-    if brightest < FAINT {
-        if u.z * FAINT >= brightest {
+    if brightest < ROULETTE_THRESHOLD {
+        if u.z * ROULETTE_THRESHOLD >= brightest {
             return path_ended(ray);
         }
-        ray.throughput *= FAINT / brightest;
+        ray.throughput *= ROULETTE_THRESHOLD / brightest;
     }
     if ray.stage == GROUND {
         // By Lambert's law about the local zenith.
@@ -193,7 +193,7 @@ fn scattered_on(given: PathRay, pixel: vec2u) -> PathRay {
         ray.direction = scattered(ray.direction, params.light.g, u.xy);
     } else {
         let sample = droplet_sample(u.xy);
-        ray.direction = turned(ray.direction, sample.x, u.y);
+        ray.direction = rotate_by(ray.direction, sample.x, u.y);
         ray.throughput *= sample.y;
     }
     ray.flight = flight_from(ray.origin, ray.direction);

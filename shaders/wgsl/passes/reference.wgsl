@@ -38,15 +38,15 @@ fn reference(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let index = active_rays[id.x];
-    let pixel = vec2u(index % frame.view.width, dispatch.sheet_row + index / frame.view.width);
+    let pixel = vec2u(index % frame.view.width, dispatch.strip_row + index / frame.view.width);
     let view = view_direction(vec2f(pixel) + 0.5);
     let direction = view.xyz;
-    let stretches = stretches_before(cloud_stretches(direction), scene_distance(pixel));
-    let length = select(0.0, stretches.first + stretches.second, view.w > 0.0);
+    let segments = segments_before(cloud_segments(direction), scene_distance(pixel));
+    let length = select(0.0, segments.first + segments.second, view.w > 0.0);
     let empty = length <= 0.0 || (!VOLUME && !UPPER && params.clouds.coverage <= 0.0);
     let turned = seen_turn(direction, vec2f(pixel));
     let sunlit = is_sunlit();
-    let nodes = ray_nodes(stretches.start, stretch_distance(stretches, length) - stretches.start);
+    let nodes = aerial_points(segments.start, stretch_distance(segments, length) - segments.start);
     let opaque = dark_depth();
     let pixel_size = pixel_width(direction);
 
@@ -70,13 +70,13 @@ fn reference(@builtin(global_invocation_id) id: vec3u) {
         let toward_sun = ray.stage == SUN;
         let view_panel = Panel(ray.x, ray.end);
         let from_point = panel_points(view_panel)[ray.point];
-        let t = stretch_distance(stretches, select(ray.x, from_point, toward_sun));
+        let t = stretch_distance(segments, select(ray.x, from_point, toward_sun));
         let width = t * pixel_size;
         let origin = select(vec3f(0.0), t * direction, toward_sun);
         let along = select(direction, frame.sky.sun_direction, toward_sun);
-        var s = stretches;
+        var s = segments;
         if toward_sun {
-            s = Stretches(ray.sun_start, ray.sun_first, ray.sun_gap, ray.sun_second);
+            s = Segments(ray.sun_start, ray.sun_first, ray.sun_gap, ray.sun_second);
         }
         let x = select(ray.x, ray.sun_x, toward_sun);
         let left = select(length, s.first + s.second, toward_sun) - x;
@@ -130,7 +130,7 @@ fn reference(@builtin(global_invocation_id) id: vec3u) {
             ray.sun_x = 0.0;
             ray.sun_depth = 0.0;
             let from_here = panel_points(Panel(ray.x, ray.end))[ray.point];
-            let sun = cloud_stretches_from(stretch_distance(stretches, from_here) * direction, frame.sky.sun_direction);
+            let sun = cloud_stretches_from(stretch_distance(segments, from_here) * direction, frame.sky.sun_direction);
             ray.sun_start = sun.start;
             ray.sun_first = sun.first;
             ray.sun_gap = sun.gap;
@@ -150,11 +150,11 @@ fn reference(@builtin(global_invocation_id) id: vec3u) {
             let uneven = abs(ray.sun_depth - ray.first_depth) > finer * UNEVEN
                 && weight * abs(sun.x - sun.y) > 0.1 * params.quality.tolerance * (dot(ray.sun, vec4f(1.0)) + DARK);
             ray.stage = VIEW;
-            if uneven && ray.end - ray.x > 1.5 * shortest_panel(stretches, ray.x) {
+            if uneven && ray.end - ray.x > 1.5 * shortest_panel(segments, ray.x) {
                 ray.longest = 0.5 * (ray.end - ray.x);
             } else {
                 let weights = weight * vec2f(first, 1.0 - first);
-                let distances = vec2f(stretch_distance(stretches, points.x), stretch_distance(stretches, points.y));
+                let distances = vec2f(stretch_distance(segments, points.x), stretch_distance(segments, points.y));
                 var sum = Gathered(ray.sun, ray.above, ray.weight);
                 sum = gather(sum, nodes, weights.x, sun.x, ray.share.x, distances.x);
                 sum = gather(sum, nodes, weights.y, sun.y, ray.share.y, distances.y);
@@ -176,7 +176,7 @@ fn reference(@builtin(global_invocation_id) id: vec3u) {
 }
 
 // A ray that has come to its end: done, or from the start again with panels half as long.
-fn finished(given: ReferenceRay, index: u32, nodes: Nodes, direction: vec3f, empty: bool) -> ReferenceRay {
+fn finished(given: ReferenceRay, index: u32, nodes: AerialPoints, direction: vec3f, empty: bool) -> ReferenceRay {
     var ray = given;
     let sum = Gathered(ray.sun, ray.above, ray.weight);
     let whole = gathered_weight(sum);

@@ -6,13 +6,13 @@
 #import bindings
 #import camera
 #import contrast
-#import lattice
+#import sample_grid
 #import scene_depth
 
 // Lists the pixels of the lattice.
 @compute @workgroup_size(GRID_GROUP, GRID_GROUP)
-fn list_lattice(@builtin(global_invocation_id) id: vec3u) {
-    let last = vec2u(dispatch.march_width, dispatch.sheet_rows) - 1u;
+fn list_grid(@builtin(global_invocation_id) id: vec3u) {
+    let last = vec2u(dispatch.march_width, dispatch.strip_rows) - 1u;
     let size = (last + dispatch.lattice - 1u) / dispatch.lattice + 1u;
     if any(id.xy >= size) {
         return;
@@ -26,7 +26,7 @@ fn list_lattice(@builtin(global_invocation_id) id: vec3u) {
 
 @compute @workgroup_size(GRID_GROUP, GRID_GROUP)
 fn refine(@builtin(global_invocation_id) id: vec3u) {
-    let last = vec2u(dispatch.march_width, dispatch.sheet_rows) - 1u;
+    let last = vec2u(dispatch.march_width, dispatch.strip_rows) - 1u;
     if any(id.xy > (last + dispatch.lattice - 1u) / dispatch.lattice) {
         return;
     }
@@ -45,60 +45,60 @@ fn refine(@builtin(global_invocation_id) id: vec3u) {
     let b = read(vec2u(high.x, low.y));
     let c = read(vec2u(low.x, high.y));
     let d = read(high);
-    let own = joined(joined(looks(a), looks(b)), joined(looks(c), looks(d)));
-    let above = joined(looks(read(vec2u(low.x, before.y))), looks(read(vec2u(high.x, before.y))));
-    let left = joined(looks(read(vec2u(before.x, low.y))), looks(read(vec2u(before.x, high.y))));
+    let own = union_of(union_of(bounds_of(a), bounds_of(b)), union_of(bounds_of(c), bounds_of(d)));
+    let above = union_of(bounds_of(read(vec2u(low.x, before.y))), bounds_of(read(vec2u(high.x, before.y))));
+    let left = union_of(bounds_of(read(vec2u(before.x, low.y))), bounds_of(read(vec2u(before.x, high.y))));
     let share = vec2f(middle - low) / vec2f(max(high - low, vec2u(1u)));
     if has.x {
-        settle(vec2u(middle.x, low.y), joined(own, above), mixed(a, b, share.x));
+        resolve(vec2u(middle.x, low.y), union_of(own, above), lerp_samples(a, b, share.x));
     }
     if has.y {
-        settle(vec2u(low.x, middle.y), joined(own, left), mixed(a, c, share.y));
+        resolve(vec2u(low.x, middle.y), union_of(own, left), lerp_samples(a, c, share.y));
     }
     if all(has) {
-        settle(middle, own, mixed(mixed(a, b, share.x), mixed(c, d, share.x), share.y));
+        resolve(middle, own, lerp_samples(lerp_samples(a, b, share.x), lerp_samples(c, d, share.x), share.y));
     }
 }
 
 // What is known of a pixel.
-struct Known {
+struct RaySample {
     value: vec4f, // as `clouds`
     distance: vec2f, // opacity times depth, opacity
     span: vec2f,
     scene: f32, // m along the ray
 }
 
-fn read(pixel: vec2u) -> Known {
+fn read(pixel: vec2u) -> RaySample {
     let index = pixel.y * dispatch.march_width + pixel.x;
     let value = clouds[index];
     let depth = cloud_depth[index];
     let opacity = depth_weight(value.a, depth);
-    return Known(value, opacity * vec2f(depth, 1.0), cloud_span[index], scene_at(pixel));
+    return RaySample(value, opacity * vec2f(depth, 1.0), cloud_span[index], scene_at(pixel));
 }
 
 fn scene_at(pixel: vec2u) -> f32 {
-    return scene_distance(marched_pixel(vec2u(pixel.x, dispatch.sheet_row + pixel.y)));
+    return scene_distance(marched_pixel(vec2u(pixel.x, dispatch.strip_row + pixel.y)));
 }
 
-fn mixed(a: Known, b: Known, share: f32) -> Known {
-    return Known(mix(a.value, b.value, share), mix(a.distance, b.distance, share), vec2f(0.0), NO_SCENE);
+fn lerp_samples(a: RaySample, b: RaySample, share: f32) -> RaySample {
+    return RaySample(mix(a.value, b.value, share), mix(a.distance, b.distance, share), vec2f(0.0), NO_SCENE);
 }
 
 // How the corners of squares look: least and most light, least and most transmittance, where the clouds are, and how
 // near the user's scene.
-struct Looks {
+struct Bounds {
     light: vec2f,
     transmittance: vec2f,
     span: vec2f,
     scene: f32,
 }
 
-fn looks(k: Known) -> Looks {
-    return Looks(vec2f(brightness(k.value)), k.value.aa, k.span, k.scene);
+fn bounds_of(k: RaySample) -> Bounds {
+    return Bounds(vec2f(brightness(k.value)), k.value.aa, k.span, k.scene);
 }
 
-fn joined(a: Looks, b: Looks) -> Looks {
-    return Looks(
+fn union_of(a: Bounds, b: Bounds) -> Bounds {
+    return Bounds(
         vec2f(min(a.light.x, b.light.x), max(a.light.y, b.light.y)),
         vec2f(min(a.transmittance.x, b.transmittance.x), max(a.transmittance.y, b.transmittance.y)),
         vec2f(min(a.span.x, b.span.x), max(a.span.y, b.span.y)),
@@ -106,7 +106,7 @@ fn joined(a: Looks, b: Looks) -> Looks {
     );
 }
 
-fn settle(pixel: vec2u, around: Looks, between: Known) {
+fn resolve(pixel: vec2u, around: Bounds, between: RaySample) {
     let index = pixel.y * dispatch.march_width + pixel.x;
     // Rays that the user's scene ends say nothing of what lies behind it: each ray beside it is marched, and all of it.
     let open = min(around.scene, scene_at(pixel)) >= NO_SCENE;

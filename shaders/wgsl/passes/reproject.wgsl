@@ -1,5 +1,5 @@
 // Fills a frame from its own rays, one in each cell, and from the frame before (nubis2015, "reprojection"). In a sparse
-// picture a pixel here is one that is known (lattice.wgsl).
+// picture a pixel here is one that is known (sample_grid.wgsl).
 //
 // `predict` reads the history where the pixel of each new ray was; `validate` compares ray and prediction; `reproject` follows
 // the history where it has predicted the rays around, interpolates between these where they look alike, and lists the rest
@@ -9,7 +9,7 @@
 #import camera
 #import shell
 #import contrast
-#import lattice
+#import sample_grid
 #import scene_depth
 
 // Pixels of a cell in each direction: 4, in a sparse picture 2 (reproject.rs).
@@ -17,7 +17,7 @@ override STRIDE: i32 = 4;
 
 // Frames in which every pixel of a cell is marched once: the length of the history of a pixel that has had a ray of its own and
 // has been followed since. An interpolated one counts its frames.
-override ROUND: u32 = u32(STRIDE * STRIDE);
+override CYCLE: u32 = u32(STRIDE * STRIDE);
 
 // Contrast between a ray and its prediction up to which the history around is followed: that of adaptive sampling
 // (`quality.contrast`), within these. Measured in flights of five scenes at 480x270, error against a picture of rays alone and
@@ -70,13 +70,13 @@ const MARCHED = 2u;
 
 @compute @workgroup_size(8, 8)
 fn predict(@builtin(global_invocation_id) id: vec3u) {
-    if id.x >= dispatch.march_width || id.y >= dispatch.sheet_rows {
+    if id.x >= dispatch.march_width || id.y >= dispatch.strip_rows {
         return;
     }
     let at = vec2i(id.xy);
     var past: CellPast;
     past.distance = nearest_cloud(at);
-    past.ray_distance = fresh_depth[cell_index(at)];
+    past.ray_distance = current_depth[cell_index(at)];
     // Where the cloud seen here was in the frame before. Where no cloud is near, the sky stands still.
     let centre = pixel_place(vec2f(at * STRIDE) + 0.5 * f32(STRIDE));
     let away = select(frame.view.far_distance, past.distance, past.distance >= 0.0);
@@ -111,17 +111,17 @@ fn predict(@builtin(global_invocation_id) id: vec3u) {
     let d = history_row(corner + vec2i(0, 3), across, f.x);
     let cubic = a.cubic[0] * down.x + b.cubic[0] * down.y + c.cubic[0] * down.z + d.cubic[0] * down.w;
     let from_history = limited(cubic, mix(b.linear[0], c.linear[0], f.y), b, c, 0u);
-    past.predicted = select(fresh[cell_index(at)], from_history, inside);
+    past.predicted = select(current[cell_index(at)], from_history, inside);
     let seen = (was.z > 0.0 || frame.view.moving == 0u) && was_known(shifted) && is_finite4(past.predicted);
     let length = history_length[pixel_index(shifted)];
-    past.source = select(UNSEEN, select(GUESSED, MARCHED, inside && length == ROUND), seen || !inside);
+    past.source = select(UNSEEN, select(GUESSED, MARCHED, inside && length == CYCLE), seen || !inside);
     cells[cell_index(at)] = past;
 }
 
 // Compares the new ray of a cell with what the history predicts, and those around.
 @compute @workgroup_size(8, 8)
 fn validate(@builtin(global_invocation_id) id: vec3u) {
-    if id.x >= dispatch.march_width || id.y >= dispatch.sheet_rows {
+    if id.x >= dispatch.march_width || id.y >= dispatch.strip_rows {
         return;
     }
     let at = vec2i(id.xy);
@@ -134,7 +134,7 @@ fn validate(@builtin(global_invocation_id) id: vec3u) {
     loop {
         let near = cell_index(at + vec2i(i % 3, i / 3) - 1);
         let past = cells[near];
-        let ray = fresh[near];
+        let ray = current[near];
         if past.source == MARCHED {
             let weight = 1.0 - max(ray.a, past.predicted.a);
             let change = (ray.rgb - past.predicted.rgb) / max(ray.rgb + past.predicted.rgb, vec3f(1e-30));
@@ -158,7 +158,7 @@ fn validate(@builtin(global_invocation_id) id: vec3u) {
     let change = clamp(sure * sum / weight, vec3f(-MOST_CHANGE), vec3f(MOST_CHANGE));
     let gain = (1.0 + change) / (1.0 - change);
 
-    let ray = fresh[index];
+    let ray = current[index];
     let with_gain = vec4f(past.predicted.rgb * gain, past.predicted.a);
     let error = max(contrast_of_two(ray, with_gain), JUMP * contrast_of_two(ray, past.predicted));
     // Three clouded cells outvote one: where a fourth of them is not as predicted, nothing of the history is kept.
@@ -264,7 +264,7 @@ fn read_cell(at: vec2i) -> Cell {
         contrast(vec2f(least.w, most.w), vec2f(thickest.w, clearest.w)),
     );
     // Beyond the outermost rays there is nothing to interpolate.
-    let last = vec2i(vec2u(dispatch.march_width, dispatch.sheet_rows)) - 1;
+    let last = vec2i(vec2u(dispatch.march_width, dispatch.strip_rows)) - 1;
     let wraps = CAMERA == EQUIRECT && !SPARSE;
     let outside = vec4<bool>(at.y == 0, at.y == last.y, at.x == 0 && !wraps, at.x == last.x && !wraps);
     cell.contrast = select(cell.contrast, vec4f(UNKNOWN), outside.xxyy | outside.zwzw);
@@ -349,7 +349,7 @@ fn begin(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let on_lattice = (id.xy % dispatch.lattice == vec2u(0u)) | (id.xy == size - 1u);
-    followed[id.y * size.x + id.x] = select(ROUND - 1u, ROUND, all(on_lattice));
+    followed[id.y * size.x + id.x] = select(CYCLE - 1u, CYCLE, all(on_lattice));
 }
 
 // The frame before in the size of this one, and known at as many pixels: what lies between its own.
@@ -372,7 +372,7 @@ fn rescale(@builtin(global_invocation_id) id: vec3u) {
     cloud_depth[index] = history_depth[nearest];
     // A ray of its own, or as many guesses.
     let past = history_length[nearest];
-    followed[index] = select(min(past, ROUND - 1u), ROUND, past == frame.view.previous_round);
+    followed[index] = select(min(past, CYCLE - 1u), CYCLE, past == frame.view.previous_cycle);
 }
 
 fn previous_index(pixel: vec2i) -> u32 {
@@ -417,7 +417,7 @@ fn fill(cell: Cell, place: vec2i, old: vec4f, alone: bool) {
     let shifted = pixel + cell.shift;
     let length = history_length[pixel_index(shifted)];
     let depth = history_depth[pixel_index(shifted)];
-    let error = select(quarter(cell.error, place), quarter(cell.own_error, place), length == ROUND);
+    let error = select(quarter(cell.error, place), quarter(cell.own_error, place), length == CYCLE);
     let contrast = quarter(cell.contrast, place);
     let least = INTERPOLATED * params.quality.contrast * narrowness(cell.past);
     let alike = contrast <= least;
@@ -434,14 +434,14 @@ fn fill(cell: Cell, place: vec2i, old: vec4f, alone: bool) {
     if is_fresh {
         value = cell.level[1];
         value_depth = cell.past.ray_distance;
-        value_length = ROUND;
+        value_length = CYCLE;
     } else if (SCENE && alone) || !(follows || (alike && agreed)) {
         active_rays[atomicAdd(&ray_count, 1u)] = index;
-        value_length = ROUND;
+        value_length = CYCLE;
     } else if follows {
         value = followed_value;
         value_depth = select(cell.past.distance, depth - cell.past.approach, depth >= 0.0);
-        value_length = select(min(length + 1u, ROUND - 1u), ROUND, length == ROUND);
+        value_length = select(min(length + 1u, CYCLE - 1u), CYCLE, length == CYCLE);
     }
     if !is_finite4(value) {
         value = vec4f(0.0, 0.0, 0.0, 1.0);
@@ -464,7 +464,7 @@ fn parallax(cell: Cell, depth: f32) -> f32 {
 
 // Whether the scene has an edge among the pixels of a cell, the marched ones around it, and those of the past that are read.
 fn has_scene_edge(at: vec2i, corner: vec2i, past_corner: vec2i) -> bool {
-    let size = vec2i(vec2u(dispatch.march_width, dispatch.sheet_rows));
+    let size = vec2i(vec2u(dispatch.march_width, dispatch.strip_rows));
     var near = NO_SCENE;
     var far = 0.0;
     var i = 0;
@@ -497,9 +497,9 @@ fn scene_past(pixel: vec2i) -> f32 {
 // The three marched pixels around a cell in its row.
 fn fresh_row(cell: vec2i) -> mat3x4f {
     return mat3x4f(
-        fresh[cell_index(cell - vec2i(1, 0))],
-        fresh[cell_index(cell)],
-        fresh[cell_index(cell + vec2i(1, 0))],
+        current[cell_index(cell - vec2i(1, 0))],
+        current[cell_index(cell)],
+        current[cell_index(cell + vec2i(1, 0))],
     );
 }
 
@@ -518,7 +518,7 @@ fn nearest_cloud(cell: vec2i) -> f32 {
         let neighbour = vec2i(i % 3, i / 3) - 1;
         let offset = vec2f(neighbour) + subpixel / f32(STRIDE) - 0.5;
         let away = dot(offset, offset);
-        let depth = fresh_depth[cell_index(cell + neighbour)];
+        let depth = current_depth[cell_index(cell + neighbour)];
         if depth >= 0.0 && away < nearest {
             nearest = away;
             distance = depth;
@@ -532,7 +532,7 @@ fn nearest_cloud(cell: vec2i) -> f32 {
 }
 
 fn cell_index(cell: vec2i) -> u32 {
-    let size = vec2i(vec2u(dispatch.march_width, dispatch.sheet_rows));
+    let size = vec2i(vec2u(dispatch.march_width, dispatch.strip_rows));
     var inside = clamp(cell, vec2i(0), size - 1);
     if CAMERA == EQUIRECT && !SPARSE {
         inside.x = (cell.x + size.x) % size.x;

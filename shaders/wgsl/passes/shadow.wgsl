@@ -115,7 +115,7 @@ fn cloud_depth_to_sun(p: vec3f, fine: f32, most: f32) -> vec4f {
     var i = 0.0;
     // A loop in a loop, as in passes/march: where the weather alone says that there is nothing, nothing else is read.
     loop {
-        var column = Column();
+        var column = WeatherSample();
         var q = vec3f(0.0);
         loop {
             let at = p + stretch_distance(s, (count - i - 0.5) * step) * frame.sky.sun_direction;

@@ -13,7 +13,7 @@ const SUN_HIGH = 0.175;
 
 // The radiance of the sky by azimuth from the sun and angle from the horizon.
 @compute @workgroup_size(8, 8)
-fn sky_map_bake(@builtin(global_invocation_id) id: vec3u) {
+fn sky_view_bake(@builtin(global_invocation_id) id: vec3u) {
     let size = textureDimensions(map_out);
     if any(id.xy >= size) {
         return;
@@ -48,7 +48,7 @@ fn sky_direction(azimuth: f32, elevation: f32) -> vec3f {
 
 // Radiance of the air along a direction from the camera, up to the ground or to space, and of the night behind it.
 fn air_radiance(direction: vec3f) -> vec3f {
-    let way = air_way(direction);
+    let way = air_segment(direction);
     if params.atmosphere.enabled == 0u || way.length <= 0.0 {
         return vec3f(0.0);
     }
@@ -92,14 +92,14 @@ fn air_step(before: AirLight, direction: vec3f, t: f32, step: f32) -> AirLight {
 // The share of the sky's radiance that comes from before a distance, by direction and by the root of that distance. The night is
 // behind all air.
 @compute @workgroup_size(8, 8)
-fn air_share_bake(@builtin(global_invocation_id) id: vec3u) {
+fn aerial_perspective_bake(@builtin(global_invocation_id) id: vec3u) {
     let size = textureDimensions(volume_out);
     if any(id.xy >= size.xy) {
         return;
     }
     const STEPS_EACH = 2u;
     let direction = texel_direction(vec2f(id.xy), vec2f(size.xy));
-    let way = air_way(direction);
+    let way = air_segment(direction);
     var reached: array<vec3f, SHARE_SLICES>;
     var light = AirLight(vec3f(0.0), vec3f(0.0));
     for (var i = 0u; i < SHARE_SLICES; i++) {

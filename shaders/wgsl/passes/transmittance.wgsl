@@ -12,7 +12,7 @@ fn transmittance_bake(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= size) {
         return;
     }
-    // The inverse of air_depth_coordinates, for texel centres.
+    // The inverse of transmittance_lut_coordinates, for texel centres.
     let at = vec2f(id.xy) / vec2f(size - 1u);
     let radius = params.atmosphere.planet_radius;
     let whole = sqrt(AIR_TOP * (2.0 * radius + AIR_TOP));

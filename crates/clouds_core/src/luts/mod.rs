@@ -1,9 +1,9 @@
 //! What a march reads: look-up tables on the device, one module for each with the WGSL file of the same name under `passes/`.
 //! Each is baked when what it is made from changes.
 
-pub mod beams;
-pub mod broad_weather;
 pub mod high_clouds;
+pub mod large_scale_weather;
+pub mod light_shafts;
 pub mod lut;
 pub mod majorant;
 pub mod multiscatter;
@@ -31,7 +31,7 @@ pub(crate) struct Luts {
     blue_noise: wgpu::TextureView,
     noise: noise::Noises,
     weather: weather::Weather,
-    broad_weather: broad_weather::BroadWeather,
+    large_scale_weather: large_scale_weather::LargeScaleWeather,
     profile: profile::Profile,
     phase: phase::PhaseTable,
     high_clouds: high_clouds::HighClouds,
@@ -41,7 +41,7 @@ pub(crate) struct Luts {
     volume: volume::Volume,
     majorants: majorant::Majorants,
     ground_shadow: shadow::GroundShadow,
-    beams: beams::Beams,
+    light_shafts: light_shafts::LightShafts,
 }
 
 impl Luts {
@@ -54,7 +54,7 @@ impl Luts {
             blue_noise: view(&texture),
             noise: Default::default(),
             weather: Default::default(),
-            broad_weather: Default::default(),
+            large_scale_weather: Default::default(),
             profile: Default::default(),
             phase: Default::default(),
             high_clouds: Default::default(),
@@ -64,7 +64,7 @@ impl Luts {
             volume: Default::default(),
             majorants: Default::default(),
             ground_shadow: Default::default(),
-            beams: Default::default(),
+            light_shafts: Default::default(),
         }
     }
 
@@ -75,7 +75,7 @@ impl Luts {
         rec.specialize(specialization::of_bakes());
         self.noise.update(rec, inputs)?; // once for a seed and a finer detail
         self.weather.update(rec, inputs)?; // when its block or the mixture changes
-        self.broad_weather.update(rec, inputs)?; // when the larger map or its shares change
+        self.large_scale_weather.update(rec, inputs)?; // when the larger map or its shares change
         self.profile.update(rec, inputs)?; // once for a table
         self.phase.update(rec, inputs)?; // once for a droplet
         self.high_clouds.update(rec, inputs)?; // as they evolve
@@ -86,7 +86,7 @@ impl Luts {
         self.volume.update(rec, inputs)?; // once for a grid
         self.majorants.update(rec, inputs)?; // when paths are traced
         self.ground_shadow.update(rec, inputs)?; // as clouds and eye move, where it is seen
-        self.beams.update(rec, inputs) // as those and the view, where they shade air
+        self.light_shafts.update(rec, inputs) // as those and the view, where they shade air
     }
 
     /// The weather map alone.

@@ -31,11 +31,11 @@ impl Multiscatter {
         let from = transmittance::air(inputs.params);
         let key = format!("{from:?}");
         let tables = self.lut.update(rec, from, |rec| {
-            let texture = rec.gpu.texture("air_light", SIZE, 1);
+            let texture = rec.gpu.texture("multiscattering_lut", SIZE, 1);
             load_or_bake(rec, "multiscatter", "multiscatter", &key, &[&texture], |rec| bake(rec, &texture))?;
             Ok(view(&texture))
         })?;
-        rec.bind([("air_light", (&tables).into())]);
+        rec.bind([("multiscattering_lut", (&tables).into())]);
         Ok(())
     }
 }

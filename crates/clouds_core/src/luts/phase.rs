@@ -25,7 +25,7 @@ impl PhaseTable {
             return Ok(());
         }
         let table = self.lut.update(rec, light.droplet_diameter, |rec| {
-            let texels = kept(light.droplet_diameter);
+            let texels = load_or_bake(light.droplet_diameter);
             let texture = rec.gpu.flat("phase_table", [texels.len() as u32, 1], wgpu::TextureFormat::Rg32Float);
             rec.gpu.write_texture(&texture, &texels);
             Ok(view(&texture))
@@ -36,7 +36,7 @@ impl PhaseTable {
 }
 
 /// The table, from disk where an earlier process has made it: a second of work for the largest droplets.
-fn kept(diameter: f32) -> Vec<[f32; 2]> {
+fn load_or_bake(diameter: f32) -> Vec<[f32; 2]> {
     let key = format!("{diameter} {ENTRIES} {}", mie::VERSION);
     if let Some(stored) = cache::load("phase", &key).filter(|stored| stored.len() == 8 * ENTRIES) {
         return bytemuck::pod_collect_to_vec(&stored);

@@ -35,7 +35,7 @@ pub(crate) struct GroundShadow {
 
 /// Whether a picture reads them.
 fn wanted(frame: &Frame) -> bool {
-    frame.beams || frame.ground_shadow && !frame.cloudless
+    frame.light_shafts || frame.ground_shadow && !frame.cloudless
 }
 
 impl GroundShadow {

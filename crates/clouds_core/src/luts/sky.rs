@@ -29,7 +29,7 @@ type Key = (params::Sun, params::Atmosphere, [f32; 3], [f64; 3], [f32; 3]);
 /// every ten metres of height or hundreds of metres of way, not in every frame. What that costs: half of what a step changes,
 /// and a hundredth of a degree of the sun's elevation.
 fn viewpoint(eye: DVec3, params: &Params) -> DVec3 {
-    near(eye, params, 1e-4 * f64::from(params.atmosphere.planet_radius))
+    snap_to_cell(eye, params, 1e-4 * f64::from(params.atmosphere.planet_radius))
 }
 
 /// Steps of height for each factor of e of the height over a kilometre below the ground, as air thins out: of 8 m at the ground, 88 m
@@ -39,7 +39,7 @@ const HEIGHT_STEPS: f64 = 125.0;
 
 /// A place near the eye, the same for all eyes around it: at most half a `step` beside it, m, and half a step of height above or
 /// below.
-pub(super) fn near(eye: DVec3, params: &Params, step: f64) -> DVec3 {
+pub(super) fn snap_to_cell(eye: DVec3, params: &Params, step: f64) -> DVec3 {
     let radius = f64::from(params.atmosphere.planet_radius);
     let centre = DVec3::new(0.0, 0.0, -radius);
     let height = (eye - centre).length() - radius;
@@ -65,12 +65,12 @@ impl Sky {
         let (map, share, light) = self.lut.update(rec, key, |rec| {
             let frame = Frame::new(&Camera::equirect(from)?, params, 0.0, [1, 1]).bindings(rec.gpu);
             let map = view(&rec.gpu.texture("sky", SIZE, 1));
-            let share = view(&rec.gpu.texture_3d("air_share", SHARE_SIZE));
+            let share = view(&rec.gpu.texture_3d("aerial_perspective_lut", SHARE_SIZE));
             let light = rec.gpu.buffer("sky_light", 64);
             let [across, down, _] = SHARE_SIZE;
             let bakes = [
-                ("sky_map_bake", ("map_out", (&map).into()), SIZE),
-                ("air_share_bake", ("volume_out", (&share).into()), [across, down, 1]),
+                ("sky_view_bake", ("map_out", (&map).into()), SIZE),
+                ("aerial_perspective_bake", ("volume_out", (&share).into()), [across, down, 1]),
                 ("sky_light_bake", ("sky_light", (&light).into()), [1; 3]),
             ];
             for (entry, out, size) in bakes {
@@ -79,8 +79,8 @@ impl Sky {
             Ok((map, share, light))
         })?;
         rec.bind([
-            ("sky_map", (&map).into()),
-            ("air_share", (&share).into()),
+            ("sky_view_lut", (&map).into()),
+            ("aerial_perspective_lut", (&share).into()),
             ("sky_light", (&light).into()),
             ("sky_light_uniform", (&light).into()),
         ]);

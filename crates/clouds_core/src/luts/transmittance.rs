@@ -19,13 +19,13 @@ impl Transmittance {
         let from = air(inputs.params);
         let key = format!("{from:?}");
         let table = self.lut.update(rec, from, |rec| {
-            let texture = rec.gpu.texture("air_depth", SIZE, 1);
+            let texture = rec.gpu.texture("transmittance_lut", SIZE, 1);
             load_or_bake(rec, "transmittance", "transmittance", &key, &[&texture], |rec| {
                 bake_map(rec, ("transmittance", "transmittance_bake"), None, &texture);
             })?;
             Ok(view(&texture))
         })?;
-        rec.bind([("air_depth", (&table).into())]);
+        rec.bind([("transmittance_lut", (&table).into())]);
         Ok(())
     }
 }

@@ -3,7 +3,7 @@
 use crate::gpu::{Bindings, Gpu};
 
 /// What the march makes of each pixel of a sheet or of a picture.
-pub(crate) struct Marched {
+pub(crate) struct CloudBuffers {
     /// Premultiplied radiance and transmittance.
     pub clouds: wgpu::Buffer,
     /// Metres to the mean scattering point, -1 where there is none.
@@ -12,7 +12,7 @@ pub(crate) struct Marched {
     pub samples: wgpu::Buffer,
 }
 
-impl Marched {
+impl CloudBuffers {
     pub fn new(gpu: &Gpu, pixels: u64) -> Self {
         Self {
             clouds: gpu.buffer("clouds", 16 * pixels),

@@ -1,7 +1,7 @@
 //! The clouds before the sky: what the caller gets.
 
-use super::clouds::Marched;
-use super::refine::Refined;
+use super::clouds::CloudBuffers;
+use super::refine::RayList;
 use crate::frame::Frame;
 use crate::gpu::Bindings;
 use crate::gpu::Gpu;
@@ -13,16 +13,16 @@ use crate::uniforms::Dispatch;
 /// Share of the cells that are not smooth as a rule.
 const ROUGH: f64 = 0.3;
 
-/// What a picture is composed of, and into.
+/// What a picture is output of, and into.
 pub(crate) struct Parts<'a> {
-    pub marched: &'a Marched,
-    pub backdrop: &'a Backdrop,
-    pub refined: &'a Refined,
-    pub out: &'a Composed,
+    pub cloud_buffers: &'a CloudBuffers,
+    pub background_corners: &'a Background,
+    pub ray_list: &'a RayList,
+    pub out: &'a Output,
 }
 
 /// The picture, of a band or whole.
-pub(crate) struct Composed {
+pub(crate) struct Output {
     /// Radiance and alpha.
     pub image: wgpu::Buffer,
     /// Radiance of the sky without clouds.
@@ -31,7 +31,7 @@ pub(crate) struct Composed {
     pub depth: wgpu::Buffer,
 }
 
-impl Composed {
+impl Output {
     pub fn new(gpu: &Gpu, pixels: u64) -> Self {
         Self {
             image: gpu.picture_buffer("image", 16 * pixels),
@@ -45,12 +45,12 @@ impl Composed {
     }
 }
 
-/// What is behind the marched clouds at the corners of the cells of a sheet, and of those around it.
-pub(crate) struct Backdrop {
+/// What is behind the cloud_buffers clouds at the corners of the cells of a sheet, and of those around it.
+pub(crate) struct Background {
     pub corners: wgpu::Buffer,
 }
 
-impl Backdrop {
+impl Background {
     pub fn new(gpu: &Gpu, size: [u32; 2]) -> Self {
         Self { corners: gpu.buffer("corners", 64 * corners(size).map(u64::from).iter().product::<u64>()) }
     }
@@ -64,7 +64,7 @@ fn corners(size: [u32; 2]) -> [u32; 2] {
     size.map(|pixels| pixels.div_ceil(TILE) + 3)
 }
 
-/// Whether what is behind the clouds is worked out by cells: where clouds are marched so, and cells as narrow as theirs. The
+/// Whether what is behind the clouds is worked out by cells: where clouds are cloud_buffers so, and cells as narrow as theirs. The
 /// high clouds are a single layer then, as they are from below.
 pub(crate) fn by_cells(frame: &Frame, quality: &Quality) -> bool {
     let single = !frame.high_clouds || frame.view.power_high <= 0.0;
@@ -75,26 +75,30 @@ pub(crate) fn by_cells(frame: &Frame, quality: &Quality) -> bool {
 /// of light is seen.
 pub(crate) fn record(rec: &mut Recorder<'_>, frame: &Frame, params: &Params, parts: &Parts<'_>, by_cells: bool) {
     let gpu = rec.gpu;
-    let Parts { marched, backdrop, refined, out } = parts;
-    let whole = Dispatch { first_row: frame.dispatch.sheet_row, ..frame.dispatch.clone() };
-    let ours = [marched.bindings(), out.bindings()].concat();
+    let Parts { cloud_buffers, background_corners, ray_list, out } = parts;
+    let whole = Dispatch { first_row: frame.dispatch.strip_row, ..frame.dispatch.clone() };
+    let ours = [cloud_buffers.bindings(), out.bindings()].concat();
     if by_cells {
         let block = vec![whole.binding(gpu)];
         let size = [frame.view.width, frame.dispatch.rows];
         let [columns, rows] = corners(size);
-        rec.dispatch(("composite", "backdrop"), [block.clone(), backdrop.bindings()].concat(), [columns, rows, 1]);
+        rec.dispatch(
+            ("composite", "background_corners"),
+            [block.clone(), background_corners.bindings()].concat(),
+            [columns, rows, 1],
+        );
         let [columns, rows] = size.map(|pixels| pixels.div_ceil(TILE));
-        let ours = [ours.clone(), refined.bindings()].concat();
-        rec.clear(&refined.count);
-        let cells = [block, backdrop.bindings(), ours.clone()].concat();
+        let ours = [ours.clone(), ray_list.bindings()].concat();
+        rec.clear(&ray_list.count);
+        let cells = [block, background_corners.bindings(), ours.clone()].concat();
         rec.dispatch(("composite", "composite_cells"), cells, [columns, rows, 1]);
-        let list = refined.list(columns * rows, TILE * TILE, ROUGH);
+        let list = ray_list.list(columns * rows, TILE * TILE, ROUGH);
         rec.dispatch_list(("composite", "composite_list"), &ours, &list, |first_ray| {
             Dispatch { first_ray, ..whole.clone() }.binding(gpu)
         });
     } else {
         rec.dispatch_rows(("composite", "composite"), &ours, [frame.view.width, frame.dispatch.rows], |rows| {
-            let (first_row, rows) = (frame.dispatch.sheet_row + rows.start, rows.len() as u32);
+            let (first_row, rows) = (frame.dispatch.strip_row + rows.start, rows.len() as u32);
             Dispatch { first_row, rows, ..whole.clone() }.binding(gpu)
         });
     }

@@ -1,6 +1,6 @@
 //! Pictures on their way to a window: on the device, in 8 bits.
 
-use super::composite::Composed;
+use super::composite::Output;
 use crate::color::{TONE_MAPS, to_srgb8, tone_map_index};
 use crate::error::{Error, Result};
 use crate::frame::Frame;
@@ -82,8 +82,8 @@ impl Screen {
 }
 
 /// Shows a picture.
-pub(crate) fn record(rec: &mut Recorder<'_>, frame: &Frame, composed: &Composed, screen: &Screen) {
+pub(crate) fn record(rec: &mut Recorder<'_>, frame: &Frame, output: &Output, screen: &Screen) {
     let block = Dispatch { first_row: 0, rows: frame.view.height, ..frame.dispatch.clone() }.binding(rec.gpu);
-    let bindings = [vec![block], composed.bindings(), screen.bindings()].concat();
+    let bindings = [vec![block], output.bindings(), screen.bindings()].concat();
     rec.dispatch(("display", "display"), bindings, [frame.view.width, frame.view.height, 1]);
 }

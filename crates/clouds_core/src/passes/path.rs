@@ -1,6 +1,6 @@
 //! Paths of light through every order of scattering.
 
-use super::clouds::Marched;
+use super::clouds::CloudBuffers;
 use super::rays::Rays;
 use crate::error::Result;
 use crate::frame::Frame;
@@ -10,6 +10,6 @@ use crate::gpu::Recorder;
 pub const RAY_BYTES: u64 = 176;
 
 /// Traces the paths of the sheet of `frame`.
-pub(crate) fn run(rec: &mut Recorder<'_>, frame: &Frame, rays: &Rays, out: &Marched) -> Result<()> {
+pub(crate) fn run(rec: &mut Recorder<'_>, frame: &Frame, rays: &Rays, out: &CloudBuffers) -> Result<()> {
     rays.run(rec, frame, ("path", "path"), "path_rays", &out.bindings())
 }

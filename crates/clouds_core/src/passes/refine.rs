@@ -1,6 +1,6 @@
-//! Which pixels are marched: a coarse lattice, then those between rays that do not look alike.
+//! Which pixels are cloud_buffers: a coarse lattice, then those between rays that do not look alike.
 
-use super::clouds::Marched;
+use super::clouds::CloudBuffers;
 use crate::camera::Camera;
 use crate::frame::Frame;
 use crate::gpu::Bindings;
@@ -9,22 +9,22 @@ use crate::gpu::{List, Recorder};
 use crate::grid::{TILE, WIDEST};
 use crate::params::Quality;
 
-/// Whether the pixels of that lattice are all that is ever marched: where no contrast is too large to interpolate, and no scene of the
-/// user's has edges. The rest of the picture is interpolated where it is composed (composite.wgsl), cell by cell.
+/// Whether the pixels of that lattice are all that is ever cloud_buffers: where no contrast is too large to interpolate, and no scene of the
+/// user's has edges. The rest of the picture is interpolated where it is output (composite.wgsl), cell by cell.
 pub(crate) fn is_sparse(frame: &Frame, quality: &Quality) -> bool {
     quality.contrast >= 1.0 && !frame.scene && coarsest(frame, quality) == TILE
 }
 
 impl Quality {
-    /// Whether one in sixteen is all that is marched of a picture of so many pixels, and that an animation follows: with a `contrast` of 1,
+    /// Whether one in sixteen is all that is cloud_buffers of a picture of so many pixels, and that an animation follows: with a `contrast` of 1,
     /// where pixels are less than an eighth of a degree wide. A scene of the user's has all its pixels.
     pub fn is_sparse(&self, camera: &Camera, size: [u32; 2]) -> bool {
         self.tolerance == 0.0 && is_sparse(&Frame::seen_by(camera, size), self)
     }
 }
 
-/// The pixels to be marched next.
-pub(crate) struct Refined {
+/// The pixels to be cloud_buffers next.
+pub(crate) struct RayList {
     /// Their numbers in the sheet.
     entries: wgpu::Buffer,
     /// How many there are.
@@ -33,7 +33,7 @@ pub(crate) struct Refined {
     pub span: wgpu::Buffer,
 }
 
-impl Refined {
+impl RayList {
     pub fn new(gpu: &Gpu, pixels: u64) -> Self {
         Self {
             entries: gpu.buffer("active_rays", 4 * pixels),
@@ -58,7 +58,7 @@ impl Refined {
 
 /// Columns and rows of the lattice of `frame`, of which the last column and row are a part.
 fn lattice(frame: &Frame) -> [u32; 2] {
-    [frame.dispatch.march_width, frame.dispatch.sheet_rows].map(|size| (size - 1).div_ceil(frame.dispatch.lattice) + 1)
+    [frame.dispatch.march_width, frame.dispatch.strip_rows].map(|size| (size - 1).div_ceil(frame.dispatch.lattice) + 1)
 }
 
 /// How many pixels it has.
@@ -66,7 +66,7 @@ pub(crate) fn pixels(frame: &Frame) -> u32 {
     lattice(frame).iter().product()
 }
 
-/// Whether pixels between marched ones are looked at.
+/// Whether pixels between cloud_buffers ones are looked at.
 pub(crate) fn is_needed(frame: &Frame, quality: &Quality) -> bool {
     !frame.sparse && coarsest(frame, quality) > 1
 }
@@ -78,16 +78,16 @@ pub(crate) fn coarsest(frame: &Frame, quality: &Quality) -> u32 {
 }
 
 /// Lists the pixels of the lattice of `frame`.
-pub(crate) fn begin(rec: &mut Recorder<'_>, frame: &Frame, refined: &Refined) {
+pub(crate) fn begin(rec: &mut Recorder<'_>, frame: &Frame, ray_list: &RayList) {
     let [columns, rows] = lattice(frame);
-    let bindings = [vec![frame.dispatch.binding(rec.gpu)], refined.bindings()].concat();
-    rec.clear(&refined.count);
-    rec.dispatch(("refine", "list_lattice"), bindings, [columns, rows, 1]);
+    let bindings = [vec![frame.dispatch.binding(rec.gpu)], ray_list.bindings()].concat();
+    rec.clear(&ray_list.count);
+    rec.dispatch(("refine", "list_grid"), bindings, [columns, rows, 1]);
 }
 
-/// Halves the distance `frame.dispatch.lattice` of the lattice: interpolates `out`, or lists pixels to be marched.
-pub(crate) fn record(rec: &mut Recorder<'_>, frame: &Frame, refined: &Refined, out: &Marched) {
-    let bindings = [vec![frame.dispatch.binding(rec.gpu)], out.bindings(), refined.bindings()].concat();
+/// Halves the distance `frame.dispatch.lattice` of the lattice: interpolates `out`, or lists pixels to be cloud_buffers.
+pub(crate) fn record(rec: &mut Recorder<'_>, frame: &Frame, ray_list: &RayList, out: &CloudBuffers) {
+    let bindings = [vec![frame.dispatch.binding(rec.gpu)], out.bindings(), ray_list.bindings()].concat();
     let [columns, rows] = lattice(frame);
     rec.dispatch(("refine", "refine"), bindings, [columns, rows, 1]);
 }

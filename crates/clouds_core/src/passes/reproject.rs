@@ -1,9 +1,9 @@
-//! Temporal reprojection: one pixel in sixteen is marched, the others come from the frame before. Of a sparse picture, whose
+//! Temporal reprojection: one pixel in sixteen is cloud_buffers, the others come from the frame before. Of a sparse picture, whose
 //! clouds are known at one pixel in sixteen, one in four of those is.
 
-use super::clouds::Marched;
+use super::clouds::CloudBuffers;
 use super::march;
-use super::refine::{self, Refined};
+use super::refine::{self, RayList};
 use crate::frame::Frame;
 use crate::gpu::Gpu;
 use crate::gpu::Recorder;
@@ -13,31 +13,31 @@ use crate::params::Quality;
 use crate::scene_depth::SceneTextures;
 use crate::uniforms::Dispatch;
 
-/// Largest share of the pixels of a frame that are marched one by one: a still, which marches an eighth to a fifth of them, is
+/// Largest share of the pixels of a frame that are cloud_buffers one by one: a still, which marches an eighth to a fifth of them, is
 /// nearer to the truth then and takes no longer.
 const MOST_LISTED: f32 = 1.0 / 12.0;
 
 /// A frame, and what it rests on.
-pub(crate) struct Followed {
-    pub marched: Marched,
+pub(crate) struct HistoryBuffers {
+    pub cloud_buffers: CloudBuffers,
     /// Frames that each pixel has been followed since it was interpolated, or all of a round once it has had a ray of its own.
     pub length: wgpu::Buffer,
 }
 
-impl Followed {
+impl HistoryBuffers {
     pub fn new(gpu: &Gpu, pixels: u64) -> Self {
-        Self { marched: Marched::new(gpu, pixels), length: gpu.buffer("followed", 4 * pixels) }
+        Self { cloud_buffers: CloudBuffers::new(gpu, pixels), length: gpu.buffer("followed", 4 * pixels) }
     }
 
     pub fn bindings(&self) -> Bindings {
-        [self.marched.bindings(), vec![("followed", (&self.length).into())]].concat()
+        [self.cloud_buffers.bindings(), vec![("followed", (&self.length).into())]].concat()
     }
 
     /// As the frame before.
     fn past(&self) -> Bindings {
         vec![
-            ("history", (&self.marched.clouds).into()),
-            ("history_depth", (&self.marched.depth).into()),
+            ("history", (&self.cloud_buffers.clouds).into()),
+            ("history_depth", (&self.cloud_buffers.depth).into()),
             ("history_length", (&self.length).into()),
         ]
     }
@@ -45,7 +45,7 @@ impl Followed {
 
 /// The rays of a frame, one in each cell, and what the frame before says of them.
 pub(crate) struct Current {
-    marched: Marched,
+    cloud_buffers: CloudBuffers,
     cells: wgpu::Buffer,
     /// Votes for a still less those for going on.
     votes: wgpu::Buffer,
@@ -59,7 +59,7 @@ const CELL_BYTES: u64 = 64;
 impl Current {
     pub fn new(gpu: &Gpu, cells: u64) -> Self {
         Self {
-            marched: Marched::new(gpu, cells),
+            cloud_buffers: CloudBuffers::new(gpu, cells),
             cells: gpu.buffer("cells", CELL_BYTES * cells),
             votes: gpu.buffer("votes", 4),
             still: gpu.buffer("is_still", 4),
@@ -68,7 +68,7 @@ impl Current {
 
     /// What is kept of them on the device.
     pub fn bindings(&self) -> Bindings {
-        [self.marched.bindings(), self.own()].concat()
+        [self.cloud_buffers.bindings(), self.own()].concat()
     }
 
     fn own(&self) -> Bindings {
@@ -76,48 +76,51 @@ impl Current {
     }
 
     fn read(&self) -> Bindings {
-        let rays = vec![("fresh", (&self.marched.clouds).into()), ("fresh_depth", (&self.marched.depth).into())];
+        let rays = vec![
+            ("current", (&self.cloud_buffers.clouds).into()),
+            ("current_depth", (&self.cloud_buffers.depth).into()),
+        ];
         [rays, self.own()].concat()
     }
 }
 
 /// What a frame is made in, and from.
 pub(crate) struct Buffers<'a> {
-    pub refined: &'a Refined,
+    pub ray_list: &'a RayList,
     pub current: &'a Current,
     /// The clouds of the frame before.
-    pub before: &'a Followed,
+    pub before: &'a HistoryBuffers,
     /// The user's scene in it.
     pub scene_before: &'a SceneTextures,
-    pub now: &'a Followed,
+    pub now: &'a HistoryBuffers,
 }
 
 /// Makes a frame of rays of its own, one in each cell, and of the frame before; or, where the history says too little, a still.
 /// `index` counts frames since the last cut.
 pub(crate) fn record(rec: &mut Recorder<'_>, frame: &Frame, quality: &Quality, index: u32, buffers: &Buffers<'_>) {
     let gpu = rec.gpu;
-    let Buffers { refined, current, before, now, .. } = *buffers;
+    let Buffers { ray_list, current, before, now, .. } = *buffers;
     let sparse = frame.sparse;
     let stride = grid::stride(sparse);
     let mut rays = frame.clone();
     rays.dispatch.stride = stride * grid::spacing(sparse);
     [rays.dispatch.subpixel_x, rays.dispatch.subpixel_y] = grid::subpixel(index, sparse);
-    [rays.dispatch.march_width, rays.dispatch.sheet_rows] = grid::cells(frame.known(), sparse);
-    march::record(rec, &rays, quality, refined, &current.marched);
+    [rays.dispatch.march_width, rays.dispatch.strip_rows] = grid::cells(frame.known(), sparse);
+    march::record(rec, &rays, quality, ray_list, &current.cloud_buffers);
 
     // Asks the frame before for these rays, and compares.
     let block = rays.dispatch.binding(gpu);
-    let grid = [rays.dispatch.march_width, rays.dispatch.sheet_rows, 1];
+    let grid = [rays.dispatch.march_width, rays.dispatch.strip_rows, 1];
     let read = [before.past(), current.read(), vec![block.clone()]].concat();
     rec.clear(&current.votes);
     rec.dispatch(("reproject", "predict"), read.clone(), grid);
     rec.dispatch(("reproject", "validate"), read.clone(), grid);
 
-    // Follows, interpolates, or lists pixels that are to be marched, as neither rays nor past say anything about them.
+    // Follows, interpolates, or lists pixels that are to be cloud_buffers, as neither rays nor past say anything about them.
     let scene_before = vec![("scene_before", buffers.scene_before.depth())];
-    let read = [before.past(), current.read(), scene_before, now.bindings(), refined.bindings()].concat();
+    let read = [before.past(), current.read(), scene_before, now.bindings(), ray_list.bindings()].concat();
     let [columns, rows] = [rays.dispatch.march_width, frame.known()[1].div_ceil(stride)];
-    rec.clear(&refined.count);
+    rec.clear(&ray_list.count);
     rec.dispatch_rows(("reproject", "reproject"), &read, [columns, rows], |slice| {
         let (first_row, rows) = (stride * slice.start, stride * slice.len() as u32);
         let rows = rows.min(frame.known()[1] - first_row);
@@ -128,16 +131,22 @@ pub(crate) fn record(rec: &mut Recorder<'_>, frame: &Frame, quality: &Quality, i
     let listed = frame.of_known();
     let pixels: u32 = frame.known().iter().product();
     let most = if refine::is_needed(&listed, quality) { MOST_LISTED * pixels as f32 } else { f32::MAX };
-    let ours = [current.own(), refined.bindings(), vec![("most_listed", Binding::block(&[most.to_bits(), 0, 0, 0]))]];
+    let ours = [current.own(), ray_list.bindings(), vec![("most_listed", Binding::block(&[most.to_bits(), 0, 0, 0]))]];
     rec.dispatch(("reproject", "choose"), ours.concat(), [1; 3]);
-    march::list(rec, &listed, pixels, MOST_LISTED.into(), refined, &now.marched);
-    rec.when(&current.still, |rec| begin(rec, frame, quality, refined, now));
+    march::list(rec, &listed, pixels, MOST_LISTED.into(), ray_list, &now.cloud_buffers);
+    rec.when(&current.still, |rec| begin(rec, frame, quality, ray_list, now));
 }
 
 /// Makes a still that is the history of the frames after it.
-pub(crate) fn begin(rec: &mut Recorder<'_>, frame: &Frame, quality: &Quality, refined: &Refined, out: &Followed) {
+pub(crate) fn begin(
+    rec: &mut Recorder<'_>,
+    frame: &Frame,
+    quality: &Quality,
+    ray_list: &RayList,
+    out: &HistoryBuffers,
+) {
     let mut still = frame.of_known();
-    march::record(rec, &still, quality, refined, &out.marched);
+    march::record(rec, &still, quality, ray_list, &out.cloud_buffers);
     still.dispatch.lattice = refine::coarsest(&still, quality);
     let bindings = [vec![still.dispatch.binding(rec.gpu)], out.bindings()].concat();
     let [width, height] = frame.known();
@@ -145,7 +154,7 @@ pub(crate) fn begin(rec: &mut Recorder<'_>, frame: &Frame, quality: &Quality, re
 }
 
 /// Makes of the frame `before`, which had another size or was known at other pixels, one like `frame`.
-pub(crate) fn rescale(rec: &mut Recorder<'_>, frame: &Frame, before: &Followed, out: &Followed) {
+pub(crate) fn rescale(rec: &mut Recorder<'_>, frame: &Frame, before: &HistoryBuffers, out: &HistoryBuffers) {
     let bindings = [vec![frame.dispatch.binding(rec.gpu)], out.bindings(), before.past()].concat();
     let [width, height] = frame.known();
     rec.dispatch(("reproject", "rescale"), bindings, [width, height, 1]);

@@ -13,11 +13,11 @@ constants! {
 }
 /// The larger map on the GPU.
 #[derive(Default)]
-pub(crate) struct BroadWeather {
+pub(crate) struct LargeScaleWeather {
     lut: Lut<BroadShares>,
 }
 
-impl BroadWeather {
+impl LargeScaleWeather {
     pub fn update(&mut self, rec: &mut Recorder<'_>, inputs: &Inputs<'_>) -> Result<()> {
         let shares = inputs.params.broad_shares();
         if shares.maps.is_empty() {
@@ -45,18 +45,18 @@ impl BroadWeather {
 fn bake_source(rec: &mut Recorder<'_>, params: &Params, source: &BroadSource) -> Result<wgpu::Texture> {
     match source {
         BroadSource::Own(map) => {
-            let texture = rec.gpu.texture("broad_weather", [map.width as u32, map.height as u32, 1], 1);
+            let texture = rec.gpu.texture("large_scale_weather", [map.width as u32, map.height as u32, 1], 1);
             let shift = |v: &[f32]| [v[0] - 0.5, v[1] - 0.5, v[2] - 0.5, 0.0].map(half::f16::from_f32);
             let texels: Vec<_> = map.data.chunks_exact(3).map(shift).collect();
             rec.gpu.write_texture(&texture, &texels);
             Ok(texture)
         }
         BroadSource::Seed(seed) => {
-            let texture = rec.gpu.texture("broad_weather", [BROAD_SIZE, BROAD_SIZE, 1], 1);
-            load_or_bake(rec, "broad_weather", "broad_weather", &seed.to_string(), &[&texture], |rec| {
+            let texture = rec.gpu.texture("large_scale_weather", [BROAD_SIZE, BROAD_SIZE, 1], 1);
+            load_or_bake(rec, "large_scale_weather", "large_scale_weather", &seed.to_string(), &[&texture], |rec| {
                 let weather = Weather { seed: *seed, ..params.weather.clone() };
                 let alone = Params { weather, ..params.clone() };
-                bake_map(rec, ("broad_weather", "broad_weather"), Some(&alone), &texture);
+                bake_map(rec, ("large_scale_weather", "large_scale_weather"), Some(&alone), &texture);
             })?;
             Ok(texture)
         }

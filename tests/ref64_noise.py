@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-import twin
+import ref64
 
 FBM = np.array([0.625, 0.25, 0.125])
 SHAPE_SIZE, DETAIL_SIZE, CURL_SIZE, WEATHER_SIZE, BROAD_SIZE = 128, 32, 128, 512, 128
@@ -116,7 +116,7 @@ def worley(p, period, salt):
 
 def remap01(v, a, b):
     """nubis2015's remap to 0..1, clamped; a step where the old range has no width."""
-    return np.clip(twin.remap(v, a, np.maximum(b, a + 1e-4)), 0, 1)
+    return np.clip(ref64.remap(v, a, np.maximum(b, a + 1e-4)), 0, 1)
 
 
 def perlin_worley(perlin, worley):
@@ -340,10 +340,10 @@ def high_clouds(points, params, time):
     thicker they are than 0.02 tiles nearer to the sun.
     """
     high = params.high_clouds
-    wind = twin.compass(float(f32(high.direction)))[:2]
+    wind = ref64.compass(float(f32(high.direction)))[:2]
     axes = np.stack([wind, [-wind[1], wind[0]]], axis=-1)
     at = (points - time * f32(high.speed) * wind) @ axes / f32(high.scale)
-    toward = twin.sun_direction(params)[:2] @ axes
+    toward = ref64.sun_direction(params)[:2] @ axes
 
     def bake(texels):
         return half(high_texels(texels, high, time))
@@ -404,7 +404,7 @@ def gradients(clouds):
 
 
 def between(height, a, b, c, d):
-    return np.clip(twin.remap(height, a, b), 0, 1) * (1 - smoothstep(c, d, height))
+    return np.clip(ref64.remap(height, a, b), 0, 1) * (1 - smoothstep(c, d, height))
 
 
 def height_profile(height, kind, clouds, tower=0.0):
@@ -429,20 +429,20 @@ def height_profile(height, kind, clouds, tower=0.0):
 
 
 def base_shape(noise):
-    return twin.remap(noise[..., 0], -(1 - noise[..., 1:] @ FBM), 1)
+    return ref64.remap(noise[..., 0], -(1 - noise[..., 1:] @ FBM), 1)
 
 
 def with_coverage(base, coverage):
     """More coverage is more cloud: nothing is left at 0, the base as it is at 1."""
     coverage = np.maximum(coverage, 1e-9)
-    return np.clip(twin.remap(base, 1 - coverage, 1), 0, 1) * coverage
+    return np.clip(ref64.remap(base, 1 - coverage, 1), 0, 1) * coverage
 
 
 def eroded(shape, detail, height, depth):
     """Wispy below, billowy above."""
     share = np.clip(10 * height, 0, 1)
     modifier = detail * (1 - share) + (1 - detail) * share
-    return np.where(shape > 0, np.clip(twin.remap(shape, modifier * depth, 1), 0, 1), 0)
+    return np.where(shape > 0, np.clip(ref64.remap(shape, modifier * depth, 1), 0, 1), 0)
 
 
 def bakes(params):
@@ -483,7 +483,7 @@ def blown(params, degrees, speed, time):
     at = 0.5 * (ends[:-1, None] + ends[1:, None]) + half * nodes
     gust = np.exp(1j * (rate * at[..., None] + phase)).mean(axis=-1)
     seconds = time + f32(params.wander.wind) * (half * weights * gust).sum()
-    east, north, _ = twin.compass(float(f32(degrees))) * f32(speed)
+    east, north, _ = ref64.compass(float(f32(degrees))) * f32(speed)
     way = (east + 1j * north) * seconds
     return np.array([way.real, way.imag])
 
@@ -520,8 +520,8 @@ class Field:
         """In 1/m."""
         clouds, deck = self.params.clouds, self.params.upper_clouds
         radius = float(f32(self.params.atmosphere.planet_radius))
-        altitude = twin.altitude(points, radius)
-        points = twin.on_chart(points, radius)
+        altitude = ref64.altitude(points, radius)
+        points = ref64.on_chart(points, radius)
         limit, density = self.lower(points, altitude)
         extinction = density * f32(clouds.extinction)
         if clouds.rain_extinction > 0:
@@ -538,7 +538,7 @@ class Field:
         """Without the lean of the wind."""
         clouds, wind = self.params.clouds, self.params.wind
         height = (altitude - f32(clouds.base)) / (f32(clouds.top) - f32(clouds.base))
-        downwind = twin.compass(float(f32(wind.direction)))[:2]
+        downwind = ref64.compass(float(f32(wind.direction)))[:2]
         return points[:, :2] - f32(wind.shear) * height[:, None] * downwind
 
     def texel(self, on_map, upright, drift):
@@ -598,7 +598,7 @@ class Field:
         deck, wind = self.params.upper_clouds, self.params.wind
         base, scale = f32(deck.base), f32(deck.scale)
         height = (altitude - base) / (f32(deck.top) - base)
-        downwind = twin.compass(float(f32(deck.direction)))[:2]
+        downwind = ref64.compass(float(f32(deck.direction)))[:2]
         upright = points[:, :2] - f32(deck.shear) * height[:, None] * downwind
         extent = f32(self.params.weather.extent) * scale
         drift = blown(self.params, deck.direction, deck.speed, self.time)
@@ -628,7 +628,7 @@ class Field:
         above = (altitude + 7.4 * self.time) / 12
         at = self.carried(upright, above, (wind.direction, wind.speed))
         noise = sample(self.textures["shape_noise"], SHAPE_SIZE, at / f32(clouds.shape_scale))
-        return limit, limit * np.clip(twin.remap(noise[:, 0], 0.15, 0.65), 0, 1)
+        return limit, limit * np.clip(ref64.remap(noise[:, 0], 0.15, 0.65), 0, 1)
 
     def carried(self, at, altitude, wind, scale=1.0):
         """Where the wind has brought here what was baked."""

@@ -7,7 +7,7 @@ const BROAD_SALT = 131u;
 const BROAD_CELLS = 3u;
 
 @compute @workgroup_size(8, 8)
-fn broad_weather(@builtin(global_invocation_id) id: vec3u) {
+fn large_scale_weather(@builtin(global_invocation_id) id: vec3u) {
     let size = textureDimensions(map_out);
     if any(id.xy >= size) {
         return;

@@ -4,7 +4,7 @@ use glam::DVec2;
 
 use super::lut::{Inputs, Lut, view};
 use super::shadow;
-use super::sky::near;
+use super::sky::snap_to_cell;
 use crate::error::Result;
 use crate::frame::Frame;
 use crate::gpu::Recorder;
@@ -26,7 +26,7 @@ type Key = ([u32; 3], [[f32; 3]; 3], [f32; 3], params::Sun, params::Atmosphere, 
 
 /// The volume on the GPU.
 #[derive(Default)]
-pub(crate) struct Beams {
+pub(crate) struct LightShafts {
     lut: Lut<Key>,
 }
 
@@ -38,30 +38,30 @@ fn size(frame: &Frame) -> [u32; 3] {
     [along(frame.view.width), along(frame.view.height), SLICES]
 }
 
-impl Beams {
+impl LightShafts {
     pub fn update(&mut self, rec: &mut Recorder<'_>, inputs: &Inputs<'_>) -> Result<()> {
         let Inputs { params, frame, eye, .. } = *inputs;
-        if !frame.beams {
+        if !frame.light_shafts {
             return Ok(());
         }
         let size = size(frame);
         let axes = [frame.view.right, frame.view.up, frame.view.forward];
         let scales = [frame.view.tan_half_fov, frame.view.half_fov, frame.sky.sky_scale];
-        let from = near(eye, params, STEP);
+        let from = snap_to_cell(eye, params, STEP);
         let place = DVec2::from_array(frame.sky.shadow_eye.map(f64::from)) + from.truncate() - eye.truncate();
         let place = ((place / STEP).round() * STEP).to_array();
         let (sun, air, shadows) = (params.sun.clone(), params.atmosphere.clone(), shadow::key(inputs));
         let key = (size, axes, scales, sun, air, shadows, from.to_array(), place);
         let volume = self.lut.update(rec, key, |rec| {
-            let volume = view(&rec.gpu.texture_3d("beams", size));
+            let volume = view(&rec.gpu.texture_3d("light_shafts", size));
             let mut there = frame.clone();
             there.sky.shadow_eye = place.map(|v| v as f32);
             there.set_planet(from, params);
             let bindings = [there.bindings(rec.gpu).as_slice(), &[("volume_out", (&volume).into())]].concat();
-            rec.dispatch(("beams", "beams_bake"), bindings, [size[0], size[1], 1]);
+            rec.dispatch(("light_shafts", "light_shafts_bake"), bindings, [size[0], size[1], 1]);
             Ok(volume)
         })?;
-        rec.bind([("beams", (&volume).into())]);
+        rec.bind([("light_shafts", (&volume).into())]);
         Ok(())
     }
 }

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-import air_twin
+import ref64_air
 import nubis
-import twin
+import ref64
 
 SIZE = 160, 90
-#: Pixels that are compared with the twin.
+#: Pixels that are compared with the ref64.
 SOME = slice(4, None, 9), slice(4, None, 9)
 OFF = {"atmosphere.beams": False}
 CHEAP = nubis.quality("draft").replace(steps_zenith=8, steps_horizon=8, light_steps=1)
@@ -31,11 +31,11 @@ def lack_of_twin(renderer, camera, params, limit=np.inf, time=0.0, steps=400):
     they pass on, from above and evenly. No step is longer than what is near it is wide.
     """
     radius = params.atmosphere.planet_radius
-    directions = twin.pixel_directions(camera, *SIZE)[SOME]
+    directions = ref64.pixel_directions(camera, *SIZE)[SOME]
     shape, directions = directions.shape, directions.reshape(-1, 3)
     eye = np.array(camera.eye)
-    near, top = twin.sphere_hits(eye, directions, radius, 20_000.0)
-    ground = twin.sphere_hits(eye, directions, radius, 0.0)[0]
+    near, top = ref64.sphere_hits(eye, directions, radius, 20_000.0)
+    ground = ref64.sphere_hits(eye, directions, radius, 0.0)[0]
     end = np.minimum(np.where(ground > 0, ground, top), limit)
     start = np.maximum(near, 0)
     # By a logarithm, from 1 km on.
@@ -43,19 +43,19 @@ def lack_of_twin(renderer, camera, params, limit=np.inf, time=0.0, steps=400):
     edges = start[:, None] + 1000 * ((1 + (end - start)[:, None] / 1000) ** share - 1)
     t, dt = 0.5 * (edges[:, 1:] + edges[:, :-1]), np.diff(edges, axis=1)
     points = eye + t[..., None] * directions[:, None]
-    h = twin.altitude(points, radius)
+    h = ref64.altitude(points, radius)
     low = h < top_of(params)
     through = np.ones(t.shape)
     through[low] = renderer().sun_transmittance(points[low], params, time=time)
-    sun = twin.sun_direction(params)
-    mu = (twin.from_centre(points, radius) @ sun) / (radius + h)
+    sun = ref64.sun_direction(params)
+    mu = (ref64.from_centre(points, radius) @ sun) / (radius + h)
     cosine = (directions @ sun)[:, None]
     found = []
     for channel in range(3):
-        air = air_twin.Air(channel, params.atmosphere.haze)
+        air = ref64_air.Air(channel, params.atmosphere.haze)
         rayleigh, aerosol, extinction = air.parts(h)
         depth = np.cumsum(extinction * dt, axis=1) - 0.5 * extinction * dt
-        once = rayleigh * air_twin.phase(cosine, 0) + aerosol * air_twin.phase(cosine, 1)
+        once = rayleigh * ref64_air.phase(cosine, 0) + aerosol * ref64_air.phase(cosine, 1)
         even = (rayleigh + aerosol) * PASSED_ON * np.maximum(mu, 0) / (2 * np.pi)
         source = (once - even) * air.sunlight(h, mu) * (1 - through)
         found.append(params.sun.irradiance[channel] * np.sum(np.exp(-depth) * source * dt, axis=1))
@@ -63,18 +63,18 @@ def lack_of_twin(renderer, camera, params, limit=np.inf, time=0.0, steps=400):
 
 
 def top_of(params):
-    return params.volume.bounds[1][2] if params.volume else twin.shell(params)[1]
+    return params.volume.bounds[1][2] if params.volume else ref64.shell(params)[1]
 
 
 def smooth(**changes):
     base = {"atmosphere.enabled": True, "high_clouds.coverage": 0.0, "sun.visible": False}
     ground = {"atmosphere.ground_albedo": (0.0, 0.0, 0.0)}
-    return twin.smooth_params(**(base | ground | changes))
+    return ref64.smooth_params(**(base | ground | changes))
 
 
 def looking(pitch, azimuth=0.0, eye=(0.0, 0.0, 200.0), fov=50.0):
     eye = np.array(eye)
-    return nubis.Camera.look_at(eye, eye + 100 * twin.compass(azimuth, pitch), (0, 0, 1), fov)
+    return nubis.Camera.look_at(eye, eye + 100 * ref64.compass(azimuth, pitch), (0, 0, 1), fov)
 
 
 VIEWS = [
@@ -96,7 +96,7 @@ def test_where_shadows_are_as_smooth_as_their_levels(renderer, sun, pitch, eye):
     camera = looking(pitch, eye=eye)
     expected = lack_of_twin(renderer, camera, params, time=60.0)
     assert expected.std() > 0.5 * expected.mean() and expected.max() > 0.01
-    assert twin.relative_rmse(lack(camera, params, time=60.0)[SOME], expected) < 0.12
+    assert ref64.relative_rmse(lack(camera, params, time=60.0)[SOME], expected) < 0.12
 
 
 @pytest.mark.slow_after(1)
@@ -127,7 +127,7 @@ def test_before_a_scene(renderer, distance):
     scene = {"scene_depth": np.full(shape, distance)}
     expected = lack_of_twin(renderer, camera, params, limit=distance)
     assert expected.mean() > 1e-3
-    assert twin.relative_rmse(lack(camera, params, **scene)[SOME], expected) < 0.12
+    assert ref64.relative_rmse(lack(camera, params, **scene)[SOME], expected) < 0.12
 
 
 @pytest.mark.slow
@@ -139,7 +139,7 @@ def test_shadow_of_a_grid(renderer):
     camera = looking(15.0)
     expected = lack_of_twin(renderer, camera, params)
     assert expected.mean() > 0.01
-    assert twin.relative_rmse(lack(camera, params)[SOME], expected) < 0.2
+    assert ref64.relative_rmse(lack(camera, params)[SOME], expected) < 0.2
 
 
 @pytest.mark.slow
@@ -176,7 +176,7 @@ def test_switched_off_nothing_is_shaded():
 
     def picture(camera=camera, **changes):
         image = ours.render(camera, params.with_(**changes))
-        return image, "beams_bake" in ours.timings
+        return image, "light_shafts_bake" in ours.timings
 
     lit, baked = picture()
     plain, not_baked = picture(**OFF)
@@ -216,10 +216,10 @@ def test_every_camera_sees_the_same(kind):
     """What one pixel of it sees, a camera that looks that way alone sees too: 5 %."""
     params = smooth(**{"sun.elevation": 20.0, "sun.azimuth": 20.0})
     eye, size = (0.0, 0.0, 200.0), (240, 120)
-    forward = twin.compass(15.0, 10.0)
+    forward = ref64.compass(15.0, 10.0)
     if kind == "equirect":
         camera, pixel = nubis.Camera.equirect(eye), (52, 130)
-        direction = twin.compass((130.5 / 240 - 0.5) * 360, 90 - 52.5 / 120 * 180)
+        direction = ref64.compass((130.5 / 240 - 0.5) * 360, 90 - 52.5 / 120 * 180)
     elif kind == "fisheye":
         camera, pixel = nubis.Camera.fisheye(eye), (80, 119)
         y, x = 60 - 80.5, 119.5 - 120
@@ -230,7 +230,7 @@ def test_every_camera_sees_the_same(kind):
     else:
         fov = 3.0 if kind == "narrow" else 120.0
         camera, pixel = nubis.Camera.look_at(eye, eye + 100 * forward, (0, 0, 1), fov), (52, 130)
-        direction = twin.pixel_directions(camera, *size)[pixel]
+        direction = ref64.pixel_directions(camera, *size)[pixel]
     alone = nubis.Camera.look_at(eye, eye + 100 * direction, (0, 0, 1), 1e-2)
     expected = lack(alone, params, (1, 1))[0, 0]
     assert expected.min() > 0
@@ -304,7 +304,7 @@ def test_shadows_stay_as_they_are_baked_anew():
         (y0, t0), (y1, t1) = a, b
         one = lack(looking(-8.0, eye=(0, y0, 900.0)), params, time=t0)
         other = lack(looking(-8.0, eye=(0, y1, 900.0)), params, time=t1)
-        return twin.relative_rmse(other, one)
+        return ref64.relative_rmse(other, one)
 
     assert change((299.9, 0.0), (300.1, 0.0)) < 0.04 < 0.5 * change((0.0, 0.0), (600.0, 0.0))
     assert change((0.0, 1.599), (0.0, 1.601)) < 0.007

@@ -4,7 +4,7 @@ Nothing is shared with the shaders but the numbers of the air (Hillaire 2020, ta
 the phase functions at every order; each straight piece is integrated for the light of the sun by
 quadrature, so that what little light there is at dusk is found too.
 
-    python tests/air_twin.py    # writes references/sky.json
+    python tests/ref64_air.py    # writes references/sky.json
 """
 
 import json

@@ -4,7 +4,7 @@
 #import camera
 #import atmosphere
 #import aerial
-#import beams
+#import light_shafts
 #import ground_shadow
 
 // Steps between two slices. At 2 rings show in the sky of `sunset`; at 8 what the air lacks errs as much as at 3, by 2 to 10 %
@@ -14,21 +14,21 @@ const STEPS = 3u;
 const SUNK = 0.05;
 
 @compute @workgroup_size(8, 8)
-fn beams_bake(@builtin(global_invocation_id) id: vec3u) {
+fn light_shafts_bake(@builtin(global_invocation_id) id: vec3u) {
     let size = textureDimensions(volume_out);
     if any(id.xy >= size.xy) {
         return;
     }
     let place = vec2f(id.xy) / vec2f(size.xy - 1u);
     let direction = view_direction(place * vec2f(f32(frame.view.width), f32(frame.view.height))).xyz;
-    let way = air_way(direction);
+    let way = air_segment(direction);
     // Where the ray is under the highest clouds.
     let under = hit_sphere(direction, frame.view.power_shade);
     let start = max(under.near, way.start);
     var end = select(0.0, min(under.far, way.start + way.length), under.hit);
     // Rays just below the horizon go on, as if through air, for those just above it that lie between the two.
     let sunk = -asin(clamp(dot(direction, frame.view.zenith), -1.0, 1.0)) - frame.view.horizon_dip;
-    end = select(end, frame.view.beam_start + frame.view.beam_length, way.grounded && sunk < SUNK);
+    end = select(end, frame.view.shaft_start + frame.view.shaft_length, way.grounded && sunk < SUNK);
     var depth = aerial_depth(direction, min(way.start, start), start, FIRST_PIECES);
 
     let one_minus_cosine = one_minus_cos(direction, frame.sky.sun_direction);
@@ -40,10 +40,10 @@ fn beams_bake(@builtin(global_invocation_id) id: vec3u) {
     let last = size.z - 1u;
     var lack = vec3f(0.0);
     var slice = 0u;
-    var reached = beam_distance(0.0);
+    var reached = shaft_distance(0.0);
     loop {
         textureStore(volume_out, vec3u(id.xy, slice), vec4f(frame.sky.sky_scale * lack, 1.0));
-        let next = beam_distance(f32(slice + 1u) / f32(last));
+        let next = shaft_distance(f32(slice + 1u) / f32(last));
         // Through the ground to the slice behind it: between the two lies what is read at the ground.
         let to_t = select(min(next, end), next, way.grounded && reached < end);
         let from_t = max(reached, start);

@@ -88,7 +88,7 @@ fn triangle_denominator(a: vec3f, b: vec3f, c: vec3f) -> f32 {
 // picture, what is beyond.
 fn marched_pixel(cell: vec2u) -> vec2u {
     let pixel = cell * dispatch.stride + vec2u(dispatch.subpixel_x, dispatch.subpixel_y);
-    return select(min(pixel, vec2u(frame.view.width, frame.view.height) - 1u), pixel, SPARSE);
+    return select(min(pixel, vec2u(frame.view.width, frame.view.height) - 1u), pixel, LOW_RESOLUTION);
 }
 
 // Where in the picture of a camera a direction falls, given as right, up and forward of that: from -1 to 1, right and up, or

@@ -3,17 +3,17 @@
 
 // Pixels from one that is known to the next.
 fn spacing() -> u32 {
-    return select(1u, TILE, SPARSE);
+    return select(1u, TILE, LOW_RESOLUTION);
 }
 
 // How many are known in this picture.
-fn known_size() -> vec2u {
-    return known_size_by(vec2u(frame.view.width, frame.view.height), spacing());
+fn sample_count() -> vec2u {
+    return sample_count_by(vec2u(frame.view.width, frame.view.height), spacing());
 }
 
 // How many are known in a picture of `size` pixels. Those of a sparse one go up to a cell beyond its right and lower edges, so
 // that each pixel lies between four.
-fn known_size_by(size: vec2u, spacing: u32) -> vec2u {
+fn sample_count_by(size: vec2u, spacing: u32) -> vec2u {
     return select(size, (size + spacing - 1u) / spacing + 1u, spacing > 1u);
 }
 

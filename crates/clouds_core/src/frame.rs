@@ -10,7 +10,7 @@ use crate::camera::{Camera, Projection};
 use crate::clipmap;
 use crate::directions::{compass, sun_direction};
 use crate::gpu::{Binding, Gpu};
-use crate::grid;
+use crate::grid::SampleGrid;
 use crate::moon::MOON_RADIUS;
 use crate::params;
 use crate::params::{Edge, Model, Params, Phase};
@@ -29,8 +29,8 @@ pub struct Frame {
     pub dispatch: Dispatch,
     /// How the camera projects.
     pub projection: Projection,
-    /// The clouds are known at the corners of cells of pixels alone (sample_grid.wgsl).
-    pub sparse: bool,
+    /// Which pixels hold a sample of the clouds.
+    pub(crate) grid: SampleGrid,
     /// There are high clouds.
     pub high_clouds: bool,
     /// They are embossed, and the sun reaches any of them in sight.
@@ -176,6 +176,7 @@ impl Frame {
     pub fn seen_by(camera: &Camera, [width, height]: [u32; 2]) -> Self {
         let mut frame = Self::default();
         [frame.view.width, frame.view.height] = [width, height];
+        frame.grid.size = [width, height];
         frame.dispatch = Dispatch { rows: height, march_width: width, ..Dispatch::default() };
         frame.set_camera(camera);
         frame
@@ -319,21 +320,25 @@ impl Frame {
     pub fn has_subrays(&self) -> bool {
         // The farthest of them that the eye can see.
         let away = self.view.power_top.max(0.0).sqrt();
-        let pixel = self.pixel_angle() * grid::spacing(self.sparse) as f32;
+        let pixel = self.pixel_angle() * self.grid.spacing() as f32;
         self.view.altitude > self.sky.shell_top && away * pixel > CLOUD_WIDTH * self.sky.leap_scale
     }
 
-    /// How many pixels of the whole picture the clouds are known at, across and down (sample_grid.wgsl).
-    pub fn known(&self) -> [u32; 2] {
-        grid::known([self.view.width, self.view.height], self.sparse)
+    /// The frame whose dispatches march every sample of the strip.
+    pub fn at_samples(&self) -> Self {
+        let spacing = self.grid.spacing();
+        let [march_width, strip_rows] = self.grid.strip(self.dispatch.strip_rows).samples();
+        let strip_row = self.dispatch.strip_row / spacing;
+        let dispatch = Dispatch { stride: spacing, march_width, strip_row, strip_rows, ..self.dispatch.clone() };
+        Self { dispatch, ..self.clone() }
     }
 
-    /// The same for the march of a sheet: of all its pixels, or of those that its clouds are known at.
-    pub fn of_known(&self) -> Self {
-        let [march_width, strip_rows] = grid::known([self.view.width, self.dispatch.strip_rows], self.sparse);
-        let stride = grid::spacing(self.sparse);
-        let strip_row = self.dispatch.strip_row / stride;
-        let dispatch = Dispatch { stride, march_width, strip_row, strip_rows, ..self.dispatch.clone() };
+    /// The frame whose dispatches march one sample of each cell of temporal reprojection: the frame `index` since the last cut.
+    pub fn at_rays(&self, index: u32) -> Self {
+        let stride = self.grid.stride() * self.grid.spacing();
+        let [subpixel_x, subpixel_y] = self.grid.subpixel(index);
+        let [march_width, strip_rows] = self.grid.cells();
+        let dispatch = Dispatch { stride, subpixel_x, subpixel_y, march_width, strip_rows, ..self.dispatch.clone() };
         Self { dispatch, ..self.clone() }
     }
 

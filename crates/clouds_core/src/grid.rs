@@ -1,35 +1,71 @@
-//! Which pixels hold a sample: those of a whole picture, or the corners of cells of one that is sparse; and which of them a
-//! frame marches.
+//! The sample grid: which pixels of a picture hold a sample of the clouds, and which of those a frame marches.
 
 use std::f32::consts::PI;
 
 use crate::shared::constants;
 
 constants! {
-    /// Pixels from one corner of a cell to the next: the distance of the pixels that are marched first, at most.
+    /// Pixels from one sample to the next at low resolution, and the largest spacing that adaptive sampling begins with.
     pub(crate) const TILE: u32 = 4;
 }
-/// The same distance as an angle, radians. Clouds are lost between rays farther apart: at 1.3 degrees `fair_weather`
+/// Largest angle between samples, radians. Clouds are lost between rays farther apart: at 1.3 degrees `fair_weather`
 /// errs by 11 %, at a third of one by 3 % (contrast 0.1).
 pub(crate) const WIDEST: f32 = 0.5 * PI / 180.0;
 
-/// How many pixels of a picture, or of a sheet, the clouds are known at.
-pub(crate) fn known(size: [u32; 2], sparse: bool) -> [u32; 2] {
-    if sparse { size.map(|pixels| pixels.div_ceil(TILE) + 1) } else { size }
+/// Frames in which an animation at full resolution marches every sample once.
+pub(crate) const CYCLE: u32 = SampleGrid { size: [1; 2], low_resolution: false }.cycle();
+
+/// Samples of a picture, or of a strip of one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct SampleGrid {
+    /// Width and height, pixels.
+    pub size: [u32; 2],
+    /// The corners of cells of [`TILE`] x [`TILE`] pixels hold a sample, not all pixels.
+    pub low_resolution: bool,
 }
 
-/// Pixels from one of those to the next.
-pub(crate) fn spacing(sparse: bool) -> u32 {
-    if sparse { TILE } else { 1 }
+impl SampleGrid {
+    /// Pixels from one sample to the next.
+    pub fn spacing(&self) -> u32 {
+        if self.low_resolution { TILE } else { 1 }
+    }
+
+    /// Columns and rows of samples. At low resolution they reach a cell beyond the right and lower edges, so that each pixel
+    /// lies between four.
+    pub fn samples(&self) -> [u32; 2] {
+        if self.low_resolution { self.size.map(|pixels| pixels.div_ceil(TILE) + 1) } else { self.size }
+    }
+
+    /// Samples along each side of a cell of temporal reprojection, of which a frame marches one.
+    pub const fn stride(&self) -> u32 {
+        if self.low_resolution { 2 } else { 4 }
+    }
+
+    /// Frames in which every sample is marched once.
+    pub const fn cycle(&self) -> u32 {
+        self.stride() * self.stride()
+    }
+
+    /// Columns and rows of those cells.
+    pub fn cells(&self) -> [u32; 2] {
+        self.samples().map(|samples| samples.div_ceil(self.stride()))
+    }
+
+    /// The pixel of a cell that the frame of a number marches.
+    pub fn subpixel(&self, index: u32) -> [u32; 2] {
+        // The first four are the corners of quarters of the cell; cells of low resolution are twice as wide.
+        let scale = if self.low_resolution { 2 } else { 1 };
+        ORDER[(index % self.cycle()) as usize].map(|place| scale * place)
+    }
+
+    /// The grid of a strip of so many rows.
+    pub fn strip(&self, rows: u32) -> Self {
+        Self { size: [self.size[0], rows], ..*self }
+    }
 }
 
-/// One of this many pixels that are known is marched in a frame, in each direction.
-pub(crate) const fn stride(sparse: bool) -> u32 {
-    if sparse { 2 } else { 4 }
-}
-
-/// The order in which the sixteen pixels of a cell are marched: a Bayer matrix, so that any few of them in a row are
-/// spread over the cell.
+/// Order in which the sixteen samples of a cell are marched: a Bayer matrix, so that any few consecutive ones are spread over
+/// the cell.
 const ORDER: [[u32; 2]; 16] = [
     [0, 0],
     [2, 2],
@@ -48,20 +84,3 @@ const ORDER: [[u32; 2]; 16] = [
     [2, 1],
     [0, 3],
 ];
-
-/// Frames in which every pixel that is known is marched once.
-pub(crate) const fn cycle(sparse: bool) -> u32 {
-    stride(sparse) * stride(sparse)
-}
-
-/// Cells of a picture of so many known pixels.
-pub(crate) fn cells(known: [u32; 2], sparse: bool) -> [u32; 2] {
-    known.map(|pixels| pixels.div_ceil(stride(sparse)))
-}
-
-/// The pixel of a cell that a frame marches.
-pub(crate) fn subpixel(index: u32, sparse: bool) -> [u32; 2] {
-    // The first four are the corners of quarters of the cell, and sparse cells twice as wide.
-    let scale = if sparse { 2 } else { 1 };
-    ORDER[(index % cycle(sparse)) as usize].map(|place| scale * place)
-}

@@ -3,7 +3,6 @@
 use crate::camera::Camera;
 use crate::frame::Frame;
 use crate::gpu::Gpu;
-use crate::grid;
 use crate::params::{self, Params};
 use crate::scene_depth::{SceneDepth, SceneTextures};
 use crate::shot::Shot;
@@ -124,9 +123,9 @@ impl Frame {
         let still = last.camera == *shot.camera && self.view.cloud_motion == [0.0; 3] && last.scene.as_deref() == scene;
         self.view.moving = u32::from(!still);
         if let Some(old) = resized {
-            [self.view.previous_width, self.view.previous_height] = old.size;
-            self.view.previous_spacing = grid::spacing(old.sparse);
-            self.view.previous_cycle = grid::cycle(old.sparse);
+            [self.view.previous_width, self.view.previous_height] = old.grid.size;
+            self.view.previous_spacing = old.grid.spacing();
+            self.view.previous_cycle = old.grid.cycle();
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::frame::Frame;
 use crate::gpu::{Download, Recorder};
-use crate::grid::{self, TILE};
+use crate::grid::{SampleGrid, TILE};
 use crate::targets::{StillTargets, count};
 
 /// A picture, row by row.
@@ -17,7 +17,7 @@ pub struct Picture {
     /// Density evaluations, primary and light together.
     pub samples: Vec<u32>,
     /// Four numbers a pixel: how sure the radiance of the clouds is, and 0. A standard error where paths are traced, the
-    /// change by the last halving where rays converge, nothing where they are cloud_buffers.
+    /// change by the last halving where rays converge, nothing where they are marched.
     pub uncertainty: Vec<f32>,
 }
 
@@ -29,8 +29,8 @@ pub(crate) fn download(rec: &mut Recorder<'_>, frame: &Frame, targets: &StillTar
     if layers {
         rec.download(&output.sky, 0, 16 * pixels);
         rec.download(&output.depth, 0, 4 * pixels);
-        let known = grid::known([frame.view.width, frame.dispatch.rows], frame.sparse);
-        rec.download(&cloud_buffers.samples, 0, 4 * count(known));
+        let samples = frame.grid.strip(frame.dispatch.rows).samples();
+        rec.download(&cloud_buffers.samples, 0, 4 * count(samples));
         if let Some(rays) = rays {
             rec.download(&rays.uncertainty, 0, 16 * pixels);
         }
@@ -47,9 +47,8 @@ impl Picture {
         self.sky.extend_from_slice(downloads[1].numbers());
         self.depth.extend_from_slice(downloads[2].numbers());
         let samples: &[u32] = downloads[3].numbers();
-        if frame.sparse {
-            let [columns, _] = grid::known([frame.view.width, frame.dispatch.rows], true);
-            self.samples.extend(at_known(samples, columns, [frame.view.width, frame.dispatch.rows]));
+        if frame.grid.low_resolution {
+            self.samples.extend(at_pixels(samples, frame.grid.strip(frame.dispatch.rows)));
         } else {
             self.samples.extend_from_slice(samples);
         }
@@ -59,10 +58,11 @@ impl Picture {
     }
 }
 
-/// A number for each pixel of a part of a sparse picture: where it is known, one of `numbers`, which has so many columns, and
-/// none between.
-fn at_known(numbers: &[u32], columns: u32, [width, height]: [u32; 2]) -> impl Iterator<Item = u32> {
+/// A number for each pixel of a picture at low resolution: that of its sample, or 0 where it has none.
+fn at_pixels(numbers: &[u32], grid: SampleGrid) -> impl Iterator<Item = u32> {
+    let [columns, _] = grid.samples();
+    let [width, height] = grid.size;
     let place = move |x: u32, y: u32| (y / TILE * columns + x / TILE) as usize;
-    let known = |x: u32, y: u32| x.is_multiple_of(TILE) && y.is_multiple_of(TILE);
-    (0..height).flat_map(move |y| (0..width).map(move |x| if known(x, y) { numbers[place(x, y)] } else { 0 }))
+    let sampled = |x: u32, y: u32| x.is_multiple_of(TILE) && y.is_multiple_of(TILE);
+    (0..height).flat_map(move |y| (0..width).map(move |x| if sampled(x, y) { numbers[place(x, y)] } else { 0 }))
 }

@@ -60,7 +60,7 @@ impl Plan {
         let integrator = Integrator::new(params, quality);
         let march = integrator == Integrator::March;
         frame.cloudless = integrator.is_cloudless(params);
-        frame.sparse = march && refine::is_sparse(frame, quality);
+        frame.grid.low_resolution = march && refine::is_low_resolution(frame, quality);
         let rows = match integrator {
             _ if whole => frame.view.height,
             Integrator::March => (STRIP_PIXELS / frame.view.width).next_multiple_of(TILE),

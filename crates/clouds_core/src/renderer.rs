@@ -8,7 +8,7 @@ use crate::blue_noise;
 use crate::error::{Error, Result};
 use crate::gpu::Recorder;
 use crate::gpu::{Gpu, Interrupt, Timings, check_fork};
-use crate::grid::{self};
+use crate::grid;
 use crate::history::{Accumulator, Past, upload_scenes};
 use crate::luts::Luts;
 use crate::params::{Model, Quality};
@@ -22,8 +22,8 @@ use crate::shot::{Shot, check_size};
 use crate::targets::{StillTargets, TemporalTargets, count, fit_temporal};
 use crate::wind::Going;
 
-/// What [`Renderer::history_length`] says of a pixel that has had a ray of its own: frames in which every pixel is cloud_buffers once.
-pub const CYCLE: u32 = grid::cycle(false);
+/// What [`Renderer::history_length`] says of a pixel that has had a ray of its own: frames in which every pixel is marched once.
+pub const CYCLE: u32 = grid::CYCLE;
 
 /// Makes pictures of one size with one numerical method on one device.
 pub struct Renderer {
@@ -150,7 +150,7 @@ impl Renderer {
                 (Integrator::Reference, Some(rays)) => reference::run(&mut rec, &frame, rays, cloud_buffers)?,
                 (Integrator::Path, Some(rays)) => path::run(&mut rec, &frame, rays, cloud_buffers)?,
                 _ if frame.cloudless => rec.clear(&cloud_buffers.samples),
-                _ => march::record(&mut rec, &frame.of_known(), &self.quality, ray_list, cloud_buffers),
+                _ => march::record(&mut rec, &frame.at_samples(), &self.quality, ray_list, cloud_buffers),
             }
             let parts = Parts { cloud_buffers, background_corners, ray_list, out: output };
             composite::record(&mut rec, &frame, &params, &parts, plan.by_cells);
@@ -162,7 +162,7 @@ impl Renderer {
     }
 
     /// The next frame of an animation by one light, onto a screen or, without one, to memory: a sixteenth of its pixels is
-    /// cloud_buffers, the others follow the clouds from the frame before. The first frame, and the first after a cut, is a still.
+    /// marched, the others follow the clouds from the frame before. The first frame, and the first after a cut, is a still.
     pub(crate) fn next_frame(
         &mut self,
         shot: &Shot<'_>,
@@ -190,7 +190,7 @@ impl Renderer {
         });
         frame.scene = shot.scene.is_some() || last.as_ref().is_some_and(|last| last.scene.is_some());
         let plan = Plan::new(&mut frame, &params, &self.quality, true, false);
-        let last = last.filter(|last| last.is_bare(shot.scene.is_some()) || last.frame.sparse == frame.sparse);
+        let last = last.filter(|last| last.is_bare(shot.scene.is_some()) || last.frame.grid == frame.grid);
         let (targets, resized) = fit_temporal(&mut self.temporal, &self.gpu, &frame);
         let resized = resized.filter(|_| last.is_some());
         upload_scenes(&mut self.scene_depth, targets, &self.gpu, shot.scene, last.as_ref(), &frame);
@@ -268,18 +268,18 @@ impl Renderer {
     pub fn history_length(&mut self) -> Result<Vec<u32>> {
         check_fork()?;
         let followed = self.last.as_ref().is_some_and(|last| !last.frame.cloudless);
-        let Some(targets) = self.temporal.as_ref().filter(|targets| followed && targets.size == self.size) else {
+        let Some(targets) = self.temporal.as_ref().filter(|targets| followed && targets.grid.size == self.size) else {
             return Ok(Vec::new());
         };
-        let [width, height] = targets.size;
-        let [columns, rows] = grid::known(targets.size, targets.sparse);
+        let [width, height] = targets.grid.size;
+        let [columns, rows] = targets.grid.samples();
         let mut timings = Timings::default();
         let mut rec = Recorder::new(&self.gpu, &mut timings, &|| Ok(()));
         rec.download(&targets.before.length, 0, 4 * count([columns, rows]));
         let lengths = rec.submit()?;
         let lengths: &[u32] = lengths[0].numbers();
-        let spacing = grid::spacing(targets.sparse);
-        let unit = CYCLE / grid::cycle(targets.sparse);
+        let spacing = targets.grid.spacing();
+        let unit = CYCLE / targets.grid.cycle();
         let at = |x: u32, y: u32| unit * lengths[(y / spacing * columns + x / spacing) as usize];
         Ok((0..height).flat_map(|y| (0..width).map(move |x| at(x, y))).collect())
     }

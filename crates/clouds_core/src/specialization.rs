@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use crate::frame::Frame;
 use crate::gpu::Specialization;
-use crate::grid;
 use crate::params::{Params, Quality, WeatherNoise};
 
 /// The table of a picture. `layers`: the sky and the depth are asked for too.
@@ -17,8 +16,8 @@ pub(crate) fn of_picture(params: &Params, quality: &Quality, frame: &Frame, laye
         ("LIGHT_SHAFTS", on(frame.light_shafts)),
         ("SCENE", on(frame.scene)),
         ("SUBRAYS", on(params.volume.is_none() && frame.has_subrays())),
-        ("SPARSE", on(frame.sparse)),
-        ("STRIDE", f64::from(grid::stride(frame.sparse))),
+        ("LOW_RESOLUTION", on(frame.grid.low_resolution)),
+        ("STRIDE", f64::from(frame.grid.stride())),
         ("WIDE_PHASE", on(frame.view.phase_samples > 1)),
         ("HIGH", on(high)),
         ("HIGH_EMBOSS", on(high && frame.high_emboss)),

@@ -3,7 +3,7 @@
 use crate::frame::Frame;
 use crate::gpu::Bindings;
 use crate::gpu::Gpu;
-use crate::grid;
+use crate::grid::SampleGrid;
 use crate::passes::clouds::CloudBuffers;
 use crate::passes::composite::{Background, Output};
 use crate::passes::rays::Rays;
@@ -15,9 +15,8 @@ use crate::scene_depth::SceneTextures;
 
 /// Buffers of the strips of a still.
 pub(crate) struct StillTargets {
-    size: [u32; 2],
+    grid: SampleGrid,
     integrator: Integrator,
-    sparse: bool,
     pub ray_list: RayList,
     pub cloud_buffers: CloudBuffers,
     pub output: Output,
@@ -26,35 +25,35 @@ pub(crate) struct StillTargets {
 }
 
 impl StillTargets {
-    fn new(gpu: &Gpu, size: [u32; 2], integrator: Integrator, sparse: bool) -> Self {
-        let [pixels, known] = [size, grid::known(size, sparse)].map(count);
+    fn new(gpu: &Gpu, grid: SampleGrid, integrator: Integrator) -> Self {
+        let [pixels, samples] = [grid.size, grid.samples()].map(count);
         let ray_bytes = match integrator {
             Integrator::March => None,
             Integrator::Reference => Some(reference::RAY_BYTES),
             Integrator::Path => Some(path::RAY_BYTES),
         };
         Self {
-            size,
+            grid,
             integrator,
-            sparse,
-            ray_list: RayList::new(gpu, known),
-            cloud_buffers: CloudBuffers::new(gpu, known),
+            ray_list: RayList::new(gpu, samples),
+            cloud_buffers: CloudBuffers::new(gpu, samples),
             output: Output::new(gpu, pixels),
-            background_corners: Background::new(gpu, size),
+            background_corners: Background::new(gpu, grid.size),
             rays: ray_bytes.map(|bytes| Rays::new(gpu, pixels, bytes)),
         }
     }
 
     /// Those of a strip: the same as before where it has room in them.
     pub fn fit<'a>(kept: &'a mut Option<Self>, gpu: &Gpu, frame: &Frame, integrator: Integrator) -> &'a Self {
-        let (sparse, [width, rows]) = (frame.sparse, [frame.view.width, frame.dispatch.strip_rows]);
+        let grid = frame.grid.strip(frame.dispatch.strip_rows);
         let fits = |old: &Self| {
-            (old.size[0], old.integrator, old.sparse) == (width, integrator, sparse) && old.size[1] >= rows
+            let same = old.grid.strip(0) == grid.strip(0) && old.integrator == integrator;
+            same && old.grid.size[1] >= grid.size[1]
         };
         if !kept.as_ref().is_some_and(fits) {
             *kept = None;
         }
-        kept.get_or_insert_with(|| Self::new(gpu, [width, rows], integrator, sparse))
+        kept.get_or_insert_with(|| Self::new(gpu, grid, integrator))
     }
 
     /// What is kept on the device.
@@ -67,8 +66,7 @@ impl StillTargets {
 
 /// Buffers of whole pictures, and what the frame before has left in them.
 pub(crate) struct TemporalTargets {
-    pub size: [u32; 2],
-    pub sparse: bool,
+    pub grid: SampleGrid,
     pub ray_list: RayList,
     pub current: Current,
     pub before: HistoryBuffers,
@@ -80,19 +78,16 @@ pub(crate) struct TemporalTargets {
 }
 
 impl TemporalTargets {
-    pub fn new(gpu: &Gpu, size: [u32; 2], sparse: bool) -> Self {
-        let known = grid::known(size, sparse);
-        let cells = grid::cells(known, sparse);
-        let [known, cells] = [known, cells].map(count);
+    pub fn new(gpu: &Gpu, grid: SampleGrid) -> Self {
+        let [samples, cells] = [grid.samples(), grid.cells()].map(count);
         Self {
-            size,
-            sparse,
-            ray_list: RayList::new(gpu, known),
+            grid,
+            ray_list: RayList::new(gpu, samples),
             current: Current::new(gpu, cells),
-            before: HistoryBuffers::new(gpu, known),
-            now: HistoryBuffers::new(gpu, known),
-            output: Output::new(gpu, count(size)),
-            background_corners: Background::new(gpu, size),
+            before: HistoryBuffers::new(gpu, samples),
+            now: HistoryBuffers::new(gpu, samples),
+            output: Output::new(gpu, count(grid.size)),
+            background_corners: Background::new(gpu, grid.size),
             scene_before: SceneTextures::new(gpu, 0, false),
         }
     }
@@ -112,9 +107,8 @@ pub(crate) fn fit_temporal<'a>(
     gpu: &Gpu,
     frame: &Frame,
 ) -> (&'a mut TemporalTargets, Option<TemporalTargets>) {
-    let (size, sparse) = ([frame.view.width, frame.view.height], frame.sparse);
-    let old = kept.take_if(|old| (old.size, old.sparse) != (size, sparse));
-    (kept.get_or_insert_with(|| TemporalTargets::new(gpu, size, sparse)), old)
+    let old = kept.take_if(|old| old.grid != frame.grid);
+    (kept.get_or_insert_with(|| TemporalTargets::new(gpu, frame.grid)), old)
 }
 
 pub(crate) fn count(size: [u32; 2]) -> u64 {

@@ -326,11 +326,11 @@ impl<'a> Worker<'a> {
         }
         let animated = matches!(request.debug_view, DebugView::Color | DebugView::HistoryLength);
         // Layer views have a value in every pixel, which `preview` does not provide.
-        let is_sparse =
-            |size| animated && Quality::named("preview").is_ok_and(|preview| preview.is_sparse(camera, size));
+        let is_low_resolution =
+            |size| animated && Quality::named("preview").is_ok_and(|preview| preview.is_low_resolution(camera, size));
         let (size, name) = request
             .frame_budget
-            .map_or((request.view_size, "draft"), |_| self.resolution.choose(request.view_size, is_sparse));
+            .map_or((request.view_size, "draft"), |_| self.resolution.choose(request.view_size, is_low_resolution));
         let quality = Quality::named(name)?;
         if !animated {
             return self.render_still(request, size, &quality, &interrupt);

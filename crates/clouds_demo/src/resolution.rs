@@ -43,11 +43,11 @@ impl DynamicResolution {
 
     /// Frame size for a window size, and the name of the quality.
     ///
-    /// `is_sparse` tells whether `preview` marches one pixel in sixteen of a frame size.
-    pub fn choose(&self, window: [u32; 2], is_sparse: impl Fn([u32; 2]) -> bool) -> ([u32; 2], &'static str) {
+    /// `is_low_resolution` tells whether `preview` marches one pixel in sixteen of a frame size.
+    pub fn choose(&self, window: [u32; 2], is_low_resolution: impl Fn([u32; 2]) -> bool) -> ([u32; 2], &'static str) {
         let at = |step: f64| window.map(|side| ((f64::from(side) * scale(step)).round() as u32).max(1));
         match at(self.step - PREVIEW_STEP) {
-            size if self.step >= PREVIEW_STEP && is_sparse(size) => (size, "preview"),
+            size if self.step >= PREVIEW_STEP && is_low_resolution(size) => (size, "preview"),
             _ => (at(self.step), "draft"),
         }
     }

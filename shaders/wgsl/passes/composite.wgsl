@@ -63,7 +63,7 @@ fn compose(pixel: vec2u) {
         return;
     }
     let at = vec2u(pixel.x, pixel.y - dispatch.strip_row);
-    let here = marched_layer(at / TILE, sparse_cell(at / TILE), at.y % TILE * TILE + at.x % TILE);
+    let here = marched_layer(at / TILE, cell_samples(at / TILE), at.y % TILE * TILE + at.x % TILE);
     let scene = scene_distance(pixel);
     var sight = sight_of(view.xyz, vec2f(pixel), pixel, scene, here);
     if DISCS {
@@ -94,15 +94,15 @@ fn wide_sky(direction: vec3f, corner: vec2f, grounded: bool) -> vec3f {
 }
 
 // What has been marched at the corners of a cell of a sparse picture.
-struct SparseCell {
+struct CellSamples {
     clouds: mat4x4f,
     distance: mat4x2f, // weight times depth, weight
 }
 
-fn sparse_cell(cell: vec2u) -> SparseCell {
-    var found: SparseCell;
-    if SPARSE && !CLOUDLESS {
-        let columns = known_size().x;
+fn cell_samples(cell: vec2u) -> CellSamples {
+    var found: CellSamples;
+    if LOW_RESOLUTION && !CLOUDLESS {
+        let columns = sample_count().x;
         let first = cell.y * columns + cell.x;
         found.clouds = mat4x4f(clouds[first], clouds[first + 1u], clouds[first + columns], clouds[first + columns + 1u]);
         found.distance = mat4x2f(
@@ -121,13 +121,13 @@ fn weighted_depth(index: u32) -> vec2f {
 }
 
 // What has been marched at a pixel of a cell, or lies between its corners; its distance as it is.
-fn marched_layer(cell: vec2u, sparse: SparseCell, i: u32) -> Layer {
+fn marched_layer(cell: vec2u, samples: CellSamples, i: u32) -> Layer {
     if CLOUDLESS {
         return Layer(vec3f(0.0), 1.0, 0.0);
     }
-    if SPARSE {
-        let cloud = sparse.clouds * corner_shares(i);
-        let distance = sparse.distance * corner_shares(i);
+    if LOW_RESOLUTION {
+        let cloud = samples.clouds * corner_shares(i);
+        let distance = samples.distance * corner_shares(i);
         return Layer(cloud.rgb, cloud.a, select(0.0, distance.x / distance.y, distance.y > 0.0));
     }
     let at = cell_pixel(TILE * cell, i);
@@ -263,15 +263,15 @@ fn composite_cells(
         edge = edge || nearest_scene(first) < NO_SCENE;
     }
     let fine = !edge && (max(farthest, -nearest) >= FINE || any(bends));
-    let sparse = sparse_cell(id.xy);
+    let samples = cell_samples(id.xy);
     // It does not matter what opaque clouds hide, but to who asks for the sky.
     var hidden = false;
     if !LAYERS && !CLOUDLESS {
         hidden = (edge || fine) && (!HIGH || (!VOLUME && frame.sky.shell_top <= params.high_clouds.altitude));
-        let c = sparse.clouds;
-        hidden = hidden && (!SPARSE || all(vec4f(c[0].a, c[1].a, c[2].a, c[3].a) == vec4f(0.0)));
+        let c = samples.clouds;
+        hidden = hidden && (!LOW_RESOLUTION || all(vec4f(c[0].a, c[1].a, c[2].a, c[3].a) == vec4f(0.0)));
     }
-    if !SPARSE && !LAYERS && !CLOUDLESS {
+    if !LOW_RESOLUTION && !LAYERS && !CLOUDLESS {
         let last = vec2u(frame.view.width, dispatch.strip_row + dispatch.rows) - 1u;
         var i = 0u;
         // It leaves soon: most cells show something, and those that do not ask are never hidden. Once false, it stays so,
@@ -300,7 +300,7 @@ fn composite_cells(
             if hidden {
                 high = Layer(vec3f(0.0), 1.0, 0.0);
             }
-            put_behind(strip_index(first, i), marched_layer(id.xy, sparse, i), high, sky.rgb + select(vec3f(0.0), layer.rgb, grounded));
+            put_behind(strip_index(first, i), marched_layer(id.xy, samples, i), high, sky.rgb + select(vec3f(0.0), layer.rgb, grounded));
         }
         i++;
         if i >= select(1u, TILE * TILE, smooth_cell) {
@@ -316,7 +316,7 @@ fn composite_cells(
                 let layer = high_layer(direction, hit_sphere(direction, frame.view.power_high).far, true, turned);
                 let shares = corner_shares(n);
                 let before = Air((air * shares).rgb, (haze * shares).rgb);
-                put_behind(strip_index(first, n), marched_layer(id.xy, sparse, n), through_air(layer, before), (behind * shares).rgb);
+                put_behind(strip_index(first, n), marched_layer(id.xy, samples, n), through_air(layer, before), (behind * shares).rgb);
             }
             n++;
             if n >= select(1u, TILE * TILE, fine_high) {
@@ -333,7 +333,7 @@ fn composite_cells(
                 let sun = ground_sun(p, cos_zenith_at(p, frame.sky.sun_direction));
                 let shares = corner_shares(n);
                 let lit = (behind * shares).rgb - (1.0 - sun) * (air * shares).rgb;
-                put_behind(strip_index(first, n), marched_layer(id.xy, sparse, n), Layer(vec3f(0.0), 1.0, 0.0), lit);
+                put_behind(strip_index(first, n), marched_layer(id.xy, samples, n), Layer(vec3f(0.0), 1.0, 0.0), lit);
             }
             n++;
             if n >= select(1u, TILE * TILE, fine_ground) {

@@ -98,8 +98,8 @@ fn predict(@builtin(global_invocation_id) id: vec3u) {
     // The last cells hang over the edge: their rays are those of the edge, or, in a sparse picture, beyond it, where nothing
     // is followed.
     let cell_pixel = at * STRIDE + own_pixel();
-    let pixel = min(cell_pixel, vec2i(known_size()) - 1);
-    let inside = !SPARSE || all(cell_pixel == pixel);
+    let pixel = min(cell_pixel, vec2i(sample_count()) - 1);
+    let inside = !LOW_RESOLUTION || all(cell_pixel == pixel);
     let shifted = pixel + vec2i(round(past.motion));
     let corner = pixel + vec2i(floor(past.motion)) - 1;
     let across = catmull_rom(fract(past.motion.x));
@@ -221,7 +221,7 @@ fn reproject(@builtin(global_invocation_id) id: vec3u) {
         let linear = b.linear * (1.0 - f.y) + c.linear * f.y;
         fill(cell, vec2i(0, y), limited(cubic[0], linear[0], b, c, 0u), alone);
         fill(cell, vec2i(1, y), limited(cubic[1], linear[1], b, c, 1u), alone);
-        if !SPARSE {
+        if !LOW_RESOLUTION {
             fill(cell, vec2i(2, y), limited(cubic[2], linear[2], b, c, 2u), alone);
             fill(cell, vec2i(3, y), limited(cubic[3], linear[3], b, c, 3u), alone);
         }
@@ -265,7 +265,7 @@ fn read_cell(at: vec2i) -> Cell {
     );
     // Beyond the outermost rays there is nothing to interpolate.
     let last = vec2i(vec2u(dispatch.march_width, dispatch.strip_rows)) - 1;
-    let wraps = CAMERA == EQUIRECT && !SPARSE;
+    let wraps = CAMERA == EQUIRECT && !LOW_RESOLUTION;
     let outside = vec4<bool>(at.y == 0, at.y == last.y, at.x == 0 && !wraps, at.x == last.x && !wraps);
     cell.contrast = select(cell.contrast, vec4f(UNKNOWN), outside.xxyy | outside.zwzw);
     cell.tolerance = tolerance(cell.past);
@@ -344,7 +344,7 @@ fn choose() {
 // or its rays have looked for cloud only where their neighbours have found it (passes/refine).
 @compute @workgroup_size(GRID_GROUP, GRID_GROUP)
 fn begin(@builtin(global_invocation_id) id: vec3u) {
-    let size = known_size();
+    let size = sample_count();
     if any(id.xy >= size) {
         return;
     }
@@ -355,7 +355,7 @@ fn begin(@builtin(global_invocation_id) id: vec3u) {
 // The frame before in the size of this one, and known at as many pixels: what lies between its own.
 @compute @workgroup_size(8, 8)
 fn rescale(@builtin(global_invocation_id) id: vec3u) {
-    let size = known_size();
+    let size = sample_count();
     if any(id.xy >= size) {
         return;
     }
@@ -376,7 +376,7 @@ fn rescale(@builtin(global_invocation_id) id: vec3u) {
 }
 
 fn previous_index(pixel: vec2i) -> u32 {
-    let size = known_size_by(vec2u(frame.view.previous_width, frame.view.previous_height), frame.view.previous_spacing);
+    let size = sample_count_by(vec2u(frame.view.previous_width, frame.view.previous_height), frame.view.previous_spacing);
     let inside = vec2u(clamp(pixel, vec2i(0), vec2i(size) - 1));
     return inside.y * size.x + inside.x;
 }
@@ -393,14 +393,14 @@ fn own_pixel() -> vec2i {
 
 // Whether the frame before has a pixel.
 fn was_known(pixel: vec2i) -> bool {
-    let has = all(pixel >= vec2i(0)) && all(pixel < vec2i(known_size()));
-    return select(in_picture(pixel), has && (CAMERA != FISHEYE || in_picture(i32(TILE) * pixel)), SPARSE);
+    let has = all(pixel >= vec2i(0)) && all(pixel < vec2i(sample_count()));
+    return select(in_picture(pixel), has && (CAMERA != FISHEYE || in_picture(i32(TILE) * pixel)), LOW_RESOLUTION);
 }
 
 // Fills a pixel of a cell, for what the frame before has in its place; `alone`, it is marched instead.
 fn fill(cell: Cell, place: vec2i, old: vec4f, alone: bool) {
     let pixel = cell.corner + place;
-    if any(pixel >= vec2i(known_size())) {
+    if any(pixel >= vec2i(sample_count())) {
         return;
     }
     let index = pixel_index(pixel);
@@ -534,16 +534,16 @@ fn nearest_cloud(cell: vec2i) -> f32 {
 fn cell_index(cell: vec2i) -> u32 {
     let size = vec2i(vec2u(dispatch.march_width, dispatch.strip_rows));
     var inside = clamp(cell, vec2i(0), size - 1);
-    if CAMERA == EQUIRECT && !SPARSE {
+    if CAMERA == EQUIRECT && !LOW_RESOLUTION {
         inside.x = (cell.x + size.x) % size.x;
     }
     return u32(inside.y * size.x + inside.x);
 }
 
 fn pixel_index(pixel: vec2i) -> u32 {
-    let size = vec2i(known_size());
+    let size = vec2i(sample_count());
     var inside = clamp(pixel, vec2i(0), size - 1);
-    if CAMERA == EQUIRECT && !SPARSE {
+    if CAMERA == EQUIRECT && !LOW_RESOLUTION {
         inside.x = (pixel.x % size.x + size.x) % size.x;
     }
     return u32(inside.y * size.x + inside.x);

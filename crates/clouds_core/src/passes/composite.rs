@@ -13,7 +13,7 @@ use crate::uniforms::Dispatch;
 /// Share of the cells that are not smooth as a rule.
 const ROUGH: f64 = 0.3;
 
-/// What a picture is output of, and into.
+/// What a picture is composed of, and into.
 pub(crate) struct Parts<'a> {
     pub cloud_buffers: &'a CloudBuffers,
     pub background_corners: &'a Background,
@@ -45,7 +45,7 @@ impl Output {
     }
 }
 
-/// What is behind the cloud_buffers clouds at the corners of the cells of a sheet, and of those around it.
+/// What is behind the marched clouds at the corners of the cells of a sheet, and of those around it.
 pub(crate) struct Background {
     pub corners: wgpu::Buffer,
 }
@@ -64,7 +64,7 @@ fn corners(size: [u32; 2]) -> [u32; 2] {
     size.map(|pixels| pixels.div_ceil(TILE) + 3)
 }
 
-/// Whether what is behind the clouds is worked out by cells: where clouds are cloud_buffers so, and cells as narrow as theirs. The
+/// Whether what is behind the clouds is worked out by cells: where clouds are marched so, and cells as narrow as theirs. The
 /// high clouds are a single layer then, as they are from below.
 pub(crate) fn by_cells(frame: &Frame, quality: &Quality) -> bool {
     let single = !frame.high_clouds || frame.view.power_high <= 0.0;

@@ -1,4 +1,4 @@
-//! Which pixels are cloud_buffers: a coarse lattice, then those between rays that do not look alike.
+//! Which pixels are marched: a coarse lattice, then those between rays that do not look alike.
 
 use super::clouds::CloudBuffers;
 use crate::camera::Camera;
@@ -9,21 +9,21 @@ use crate::gpu::{List, Recorder};
 use crate::grid::{TILE, WIDEST};
 use crate::params::Quality;
 
-/// Whether the pixels of that lattice are all that is ever cloud_buffers: where no contrast is too large to interpolate, and no scene of the
-/// user's has edges. The rest of the picture is interpolated where it is output (composite.wgsl), cell by cell.
-pub(crate) fn is_sparse(frame: &Frame, quality: &Quality) -> bool {
+/// Whether the pixels of that lattice are all that is ever marched: where no contrast is too large to interpolate, and no scene of the
+/// user's has edges. The rest of the picture is interpolated where it is composed (composite.wgsl), cell by cell.
+pub(crate) fn is_low_resolution(frame: &Frame, quality: &Quality) -> bool {
     quality.contrast >= 1.0 && !frame.scene && coarsest(frame, quality) == TILE
 }
 
 impl Quality {
-    /// Whether one in sixteen is all that is cloud_buffers of a picture of so many pixels, and that an animation follows: with a `contrast` of 1,
+    /// Whether one in sixteen is all that is marched of a picture of so many pixels, and that an animation follows: with a `contrast` of 1,
     /// where pixels are less than an eighth of a degree wide. A scene of the user's has all its pixels.
-    pub fn is_sparse(&self, camera: &Camera, size: [u32; 2]) -> bool {
-        self.tolerance == 0.0 && is_sparse(&Frame::seen_by(camera, size), self)
+    pub fn is_low_resolution(&self, camera: &Camera, size: [u32; 2]) -> bool {
+        self.tolerance == 0.0 && is_low_resolution(&Frame::seen_by(camera, size), self)
     }
 }
 
-/// The pixels to be cloud_buffers next.
+/// The pixels to be marched next.
 pub(crate) struct RayList {
     /// Their numbers in the sheet.
     entries: wgpu::Buffer,
@@ -66,9 +66,9 @@ pub(crate) fn pixels(frame: &Frame) -> u32 {
     lattice(frame).iter().product()
 }
 
-/// Whether pixels between cloud_buffers ones are looked at.
+/// Whether pixels between marched ones are looked at.
 pub(crate) fn is_needed(frame: &Frame, quality: &Quality) -> bool {
-    !frame.sparse && coarsest(frame, quality) > 1
+    !frame.grid.low_resolution && coarsest(frame, quality) > 1
 }
 
 /// The distance to begin with; 1 marches every pixel.
@@ -85,7 +85,7 @@ pub(crate) fn begin(rec: &mut Recorder<'_>, frame: &Frame, ray_list: &RayList) {
     rec.dispatch(("refine", "list_grid"), bindings, [columns, rows, 1]);
 }
 
-/// Halves the distance `frame.dispatch.lattice` of the lattice: interpolates `out`, or lists pixels to be cloud_buffers.
+/// Halves the distance `frame.dispatch.lattice` of the lattice: interpolates `out`, or lists pixels to be marched.
 pub(crate) fn record(rec: &mut Recorder<'_>, frame: &Frame, ray_list: &RayList, out: &CloudBuffers) {
     let bindings = [vec![frame.dispatch.binding(rec.gpu)], out.bindings(), ray_list.bindings()].concat();
     let [columns, rows] = lattice(frame);

@@ -1,4 +1,4 @@
-//! Temporal reprojection: one pixel in sixteen is cloud_buffers, the others come from the frame before. Of a sparse picture, whose
+//! Temporal reprojection: one pixel in sixteen is marched, the others come from the frame before. Of a sparse picture, whose
 //! clouds are known at one pixel in sixteen, one in four of those is.
 
 use super::clouds::CloudBuffers;
@@ -8,12 +8,11 @@ use crate::frame::Frame;
 use crate::gpu::Gpu;
 use crate::gpu::Recorder;
 use crate::gpu::{Binding, Bindings};
-use crate::grid;
 use crate::params::Quality;
 use crate::scene_depth::SceneTextures;
 use crate::uniforms::Dispatch;
 
-/// Largest share of the pixels of a frame that are cloud_buffers one by one: a still, which marches an eighth to a fifth of them, is
+/// Largest share of the pixels of a frame that are marched one by one: a still, which marches an eighth to a fifth of them, is
 /// nearer to the truth then and takes no longer.
 const MOST_LISTED: f32 = 1.0 / 12.0;
 
@@ -100,12 +99,9 @@ pub(crate) struct Buffers<'a> {
 pub(crate) fn record(rec: &mut Recorder<'_>, frame: &Frame, quality: &Quality, index: u32, buffers: &Buffers<'_>) {
     let gpu = rec.gpu;
     let Buffers { ray_list, current, before, now, .. } = *buffers;
-    let sparse = frame.sparse;
-    let stride = grid::stride(sparse);
-    let mut rays = frame.clone();
-    rays.dispatch.stride = stride * grid::spacing(sparse);
-    [rays.dispatch.subpixel_x, rays.dispatch.subpixel_y] = grid::subpixel(index, sparse);
-    [rays.dispatch.march_width, rays.dispatch.strip_rows] = grid::cells(frame.known(), sparse);
+    let stride = frame.grid.stride();
+    let [width, height] = frame.grid.samples();
+    let rays = frame.at_rays(index);
     march::record(rec, &rays, quality, ray_list, &current.cloud_buffers);
 
     // Asks the frame before for these rays, and compares.
@@ -116,20 +112,20 @@ pub(crate) fn record(rec: &mut Recorder<'_>, frame: &Frame, quality: &Quality, i
     rec.dispatch(("reproject", "predict"), read.clone(), grid);
     rec.dispatch(("reproject", "validate"), read.clone(), grid);
 
-    // Follows, interpolates, or lists pixels that are to be cloud_buffers, as neither rays nor past say anything about them.
+    // Follows, interpolates, or lists pixels that are to be marched, as neither rays nor past say anything about them.
     let scene_before = vec![("scene_before", buffers.scene_before.depth())];
     let read = [before.past(), current.read(), scene_before, now.bindings(), ray_list.bindings()].concat();
-    let [columns, rows] = [rays.dispatch.march_width, frame.known()[1].div_ceil(stride)];
+    let [columns, rows] = [rays.dispatch.march_width, height.div_ceil(stride)];
     rec.clear(&ray_list.count);
     rec.dispatch_rows(("reproject", "reproject"), &read, [columns, rows], |slice| {
         let (first_row, rows) = (stride * slice.start, stride * slice.len() as u32);
-        let rows = rows.min(frame.known()[1] - first_row);
+        let rows = rows.min(height - first_row);
         Dispatch { first_row, rows, ..rays.dispatch.clone() }.binding(gpu)
     });
 
     // A still, where most rays are not what the past says, or more pixels are listed than one marches.
-    let listed = frame.of_known();
-    let pixels: u32 = frame.known().iter().product();
+    let listed = frame.at_samples();
+    let pixels = width * height;
     let most = if refine::is_needed(&listed, quality) { MOST_LISTED * pixels as f32 } else { f32::MAX };
     let ours = [current.own(), ray_list.bindings(), vec![("most_listed", Binding::block(&[most.to_bits(), 0, 0, 0]))]];
     rec.dispatch(("reproject", "choose"), ours.concat(), [1; 3]);
@@ -145,17 +141,17 @@ pub(crate) fn begin(
     ray_list: &RayList,
     out: &HistoryBuffers,
 ) {
-    let mut still = frame.of_known();
+    let mut still = frame.at_samples();
     march::record(rec, &still, quality, ray_list, &out.cloud_buffers);
     still.dispatch.lattice = refine::coarsest(&still, quality);
     let bindings = [vec![still.dispatch.binding(rec.gpu)], out.bindings()].concat();
-    let [width, height] = frame.known();
+    let [width, height] = frame.grid.samples();
     rec.dispatch(("reproject", "begin"), bindings, [width, height, 1]);
 }
 
 /// Makes of the frame `before`, which had another size or was known at other pixels, one like `frame`.
 pub(crate) fn rescale(rec: &mut Recorder<'_>, frame: &Frame, before: &HistoryBuffers, out: &HistoryBuffers) {
     let bindings = [vec![frame.dispatch.binding(rec.gpu)], out.bindings(), before.past()].concat();
-    let [width, height] = frame.known();
+    let [width, height] = frame.grid.samples();
     rec.dispatch(("reproject", "rescale"), bindings, [width, height, 1]);
 }

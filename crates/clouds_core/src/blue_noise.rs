@@ -1,20 +1,20 @@
-//! A tile of blue noise by void and cluster (Ulichney 1993): thresholds whose errors the eye forgives.
+//! Blue-noise tile by void-and-cluster (Ulichney 1993): dither thresholds with errors at high spatial frequencies.
 
 use std::sync::LazyLock;
 
 use crate::shared::constants;
 
-/// The tile, made once in a process.
+/// The tile, computed once per process: thresholds from 0 to 1, row by row.
 pub static TILE: LazyLock<Vec<f32>> = LazyLock::new(tile);
 
 constants! {
-    /// Width and height of the tile of blue noise in points; a power of two, so that it wraps by masking.
+    /// Width and height of the blue-noise tile in points; a power of two, so that coordinates wrap by masking.
     pub const BLUE_SIZE: usize = 64;
 }
 
 /// Standard deviation of the energy of a point in pixels (Ulichney recommends 1.5).
 const SIGMA: f32 = 1.5;
-/// Beyond this many pixels the energy, exp(-18), no longer changes an f32 sum.
+/// Distance in pixels beyond which the energy, exp(-18), does not change an f32 sum.
 const REACH: isize = 9;
 
 struct Energy {
@@ -46,12 +46,12 @@ impl Energy {
         }
     }
 
-    /// The set point with the most energy around it.
+    /// Set point with the most energy around it.
     fn cluster(&self) -> usize {
         self.extreme(true, |a, b| a > b)
     }
 
-    /// The empty point with the least energy around it.
+    /// Empty point with the least energy around it.
     fn void(&self) -> usize {
         self.extreme(false, |a, b| a < b)
     }
@@ -64,10 +64,11 @@ impl Energy {
     }
 }
 
-/// The rank of each point divided by their number, row by row: every value from 0 to 1 once.
+/// Rank of each point divided by the number of points, row by row: each value once.
 fn tile() -> Vec<f32> {
     let mut energy = Energy::new();
-    // A tenth of the points at pseudo-random places (a Weyl sequence), then relaxed until nothing moves.
+    // Initial pattern: a tenth of the points at pseudo-random positions (a Weyl sequence), relaxed until no point
+    // moves.
     let count = BLUE_SIZE * BLUE_SIZE / 10;
     let mut state = 0u32;
     while energy.on.iter().filter(|on| **on).count() < count {
@@ -90,14 +91,14 @@ fn tile() -> Vec<f32> {
     let start = energy.on.clone();
 
     let mut rank = vec![0usize; BLUE_SIZE * BLUE_SIZE];
-    // Down: take clusters away.
+    // Ranks of the initial pattern: the tightest clusters are removed first.
     for r in (0..count).rev() {
         let point = energy.cluster();
         energy.set(point, false);
         rank[point] = r;
     }
-    // Up: fill voids, to the end. (Ulichney turns to the clusters of empty points halfway; with a Gaussian of one width
-    // the emptiest place is the same one.)
+    // Remaining ranks: the largest voids are filled. (Ulichney continues with clusters of empty points halfway; for a
+    // Gaussian of one width they coincide with the largest voids.)
     for (point, on) in start.iter().enumerate() {
         if *on {
             energy.set(point, true);
@@ -124,7 +125,7 @@ mod tests {
 
     #[test]
     fn low_frequencies_are_missing() {
-        // Blue: means of 8 x 8 blocks differ far less than white noise's would (0.289 / 8 = 0.036).
+        // Standard deviation of the means of 8 x 8 blocks: 0.289 / 8 = 0.036 for white noise, far less for blue noise.
         let tile = tile();
         let mut sum = 0.0;
         for block in 0..64 {

@@ -1,26 +1,26 @@
-//! The origin of a clipmap: levels of cells around the eye, baked again when the eye or the clouds have gone a step.
+//! Origin of a clipmap: nested levels around the eye, rebaked when the eye or the clouds have moved by a step.
 //!
-//! It is snapped to a grid of places and times that follows from the picture alone, not from those before, so that a picture
-//! is the same whatever the renderer made before it.
+//! The origin is snapped to a grid in space and time that depends on the picture alone: a picture is the same, whatever
+//! was rendered before it.
 
 use glam::{DVec2, DVec3};
 
 use crate::params::{self, Params};
 use crate::wind::{Advection, fastest};
 
-/// Side of the grid of places, m: a tenth of the finest level of the ground's shadows (passes/shadow.rs).
+/// Grid spacing of the position in m: a tenth of the finest level of the ground shadows (luts/shadow.rs).
 const EYE_STEP: f64 = 600.0;
 
-/// The side of a texel of the finest level, m, for eyes up to so high; twice as long for each doubling of the altitude, as
-/// pixels are. The sun's half degree blurs shadows of clouds 3 km up by 28 m.
+/// Texel size of the finest level in m for eyes up to `TEXEL_ALTITUDE` in m. It doubles with each doubling of the
+/// altitude, as the size of pixels on the ground does. The sun's half degree blurs shadows of clouds at 3 km by 28 m.
 const TEXEL: f32 = 64.0;
 const TEXEL_ALTITUDE: f32 = 12_000.0;
 
-/// The clouds may move so far while the shadows stay, m: half a texel, and a power of two, so that where winds have come
-/// round after times that are powers of two, shadows have too.
+/// Displacement of the clouds in m up to which the shadows are reused: half a texel. It is a power of two, so that
+/// winds that repeat after a power of two in s repeat their shadows.
 const CLOUD_STEP: f64 = 32.0;
 
-/// What casts shadows, and where: the sun's place, clouds, weather and wind.
+/// Shadow casters: elevation and azimuth of the sun, clouds, weather and winds.
 pub(crate) type Casters = (
     [f32; 2],
     (params::Clouds, params::UpperClouds),
@@ -28,7 +28,7 @@ pub(crate) type Casters = (
     (params::Wind, params::Wander, params::Drift),
 );
 
-/// Those of a sky.
+/// Shadow casters of a sky.
 pub(crate) fn casters(params: &Params) -> Casters {
     (
         [params.sun.elevation, params.sun.azimuth],
@@ -38,18 +38,18 @@ pub(crate) fn casters(params: &Params) -> Casters {
     )
 }
 
-/// The place and the time that a clipmap is baked for.
+/// Position and time that a clipmap is baked for.
 pub(crate) struct Origin {
-    /// The same by numbers, for a key.
+    /// Indices on the grid of positions and times, for keys.
     pub steps: [i64; 3],
-    /// The middle of the levels, m.
+    /// Centre of the levels, east and north, m.
     pub place: DVec2,
-    /// The time of their clouds, s.
+    /// Time of the clouds, s.
     pub time: f64,
 }
 
 impl Origin {
-    /// That of a picture, whose clouds move by `step` metres until the next.
+    /// Snapped origin for an eye and a time in s. The fastest clouds move `step` metres between two times of the grid.
     pub fn new(eye: DVec3, params: &Params, time: f64, step: f64) -> Self {
         let period = step / fastest(params).max(0.125);
         let place = (eye.truncate() / EYE_STEP).round();
@@ -58,12 +58,12 @@ impl Origin {
     }
 }
 
-/// From where and when a picture's shadows are baked: the user's grid stays where it is.
+/// Origin of the ground shadows of a picture. A user-supplied grid does not move with time.
 pub(crate) fn origin(eye: DVec3, params: &Params, time: f64) -> Origin {
     Origin::new(eye, params, if params.volume.is_some() { 0.0 } else { time }, CLOUD_STEP)
 }
 
-/// Where the eye is in the levels of its picture.
+/// Position of the eye relative to the centre of the clipmap, after advection of the clouds, m.
 pub(crate) fn camera_in_clipmap(eye: DVec3, params: &Params, time: f64) -> [f32; 2] {
     let origin = origin(eye, params, time);
     let drift = match params.volume {
@@ -73,7 +73,7 @@ pub(crate) fn camera_in_clipmap(eye: DVec3, params: &Params, time: f64) -> [f32;
     (eye.truncate() - origin.place - drift).as_vec2().to_array()
 }
 
-/// The side of a texel of the finest level for an eye at an altitude, m.
+/// Texel size of the finest level in m for an altitude of the eye in m.
 pub(crate) fn texel(altitude: f32) -> f32 {
     TEXEL * (altitude / TEXEL_ALTITUDE).max(1.0).log2().floor().exp2()
 }

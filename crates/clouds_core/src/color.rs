@@ -1,37 +1,37 @@
-//! From scene-linear Rec. 709 radiance to sRGB pixels: the only place where anything is clipped or gamma-encoded.
+//! Display transform from scene-linear Rec. 709 radiance to sRGB pixels. All clipping and gamma encoding is here.
 
 use crate::blue_noise::{self, BLUE_SIZE};
 use crate::error::{Error, Result};
 use crate::shared::constants;
 
-/// The tone maps by name.
+/// Names of the tone maps.
 pub const TONE_MAPS: [&str; 3] = ["agx", "aces", "none"];
 
 type Rgb = [f32; 3];
 
 constants! {
-    /// Shares of red, green and blue in the luminance, for Rec. 709 primaries (ITU-R BT.709).
+    /// Weights of red, green and blue in the luminance, for Rec. 709 primaries (ITU-R BT.709).
     pub const LUMINANCE: [f64; 3] = [0.2126, 0.7152, 0.0722];
 
-    /// What AgX (Troy Sobotka) begins with, for Rec. 709 primaries (Wrensch 2023).
+    /// Inset matrix of AgX (Troy Sobotka), for Rec. 709 primaries (Wrensch 2023).
     const AGX_INSET: [[f32; 3]; 3] = [
         [0.842_479_06, 0.078_433_6, 0.079_223_745],
         [0.042_328_242, 0.878_468_64, 0.079_166_13],
         [0.042_375_655, 0.078_433_6, 0.879_143],
     ];
-    /// What it ends with (Wrensch 2023).
+    /// Outset matrix of AgX, for Rec. 709 primaries (Wrensch 2023).
     const AGX_OUTSET: [[f32; 3]; 3] = [
         [1.196_879, -0.098_020_88, -0.099_029_74],
         [-0.052_896_85, 1.151_903_1, -0.098_961_18],
         [-0.052_971_635, -0.098_043_45, 1.151_073_7],
     ];
-    /// Lowest and highest stop around middle grey 0.18 that its curve covers (Wrensch 2023).
+    /// Range of the AgX curve in stops around middle grey, 0.18 (Wrensch 2023).
     const AGX_STOPS: [f32; 2] = [-12.473_93, 4.026_069];
 
-    /// What ACES (RRT and sRGB ODT) begins with, in the fit of Stephen Hill (BakingLab, 2016).
+    /// Input matrix of ACES (RRT and sRGB ODT), in the fit of Stephen Hill (BakingLab, 2016).
     const ACES_INPUT: [[f32; 3]; 3] =
         [[0.597_19, 0.354_58, 0.048_23], [0.076, 0.908_34, 0.015_66], [0.028_4, 0.133_83, 0.837_77]];
-    /// What it ends with (Hill 2016).
+    /// Output matrix of ACES (Hill 2016).
     const ACES_OUTPUT: [[f32; 3]; 3] =
         [[1.604_75, -0.531_08, -0.073_67], [-0.102_08, 1.108_13, -0.006_05], [-0.003_27, -0.072_76, 1.076_02]];
 }
@@ -40,14 +40,14 @@ fn transform(m: &[[f32; 3]; 3], v: Rgb) -> Rgb {
     m.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2])
 }
 
-/// The sRGB transfer function (IEC 61966-2-1).
+/// sRGB transfer function (IEC 61966-2-1).
 fn encode_srgb(v: f32) -> f32 {
     let v = v.clamp(0.0, 1.0);
     if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 }
 }
 
-/// AgX (Troy Sobotka), in the polynomial form of Benjamin Wrensch ("Minimal AgX Implementation", 2023) for Rec. 709
-/// primaries; its output is display-encoded.
+/// AgX (Troy Sobotka), in the polynomial approximation of Benjamin Wrensch ("Minimal AgX Implementation", 2023) for
+/// Rec. 709 primaries. The output is display-encoded.
 fn agx(v: Rgb) -> Rgb {
     let [low, high] = AGX_STOPS;
     let curve = |x: f32| {
@@ -62,11 +62,12 @@ fn agx(v: Rgb) -> Rgb {
 /// ACES (RRT and sRGB ODT), in the fit of Stephen Hill (BakingLab, 2016).
 fn aces(v: Rgb) -> Rgb {
     let fit = |v: f32| (v * (v + 0.024_578_6) - 0.000_090_537) / (v * (0.983_729 * v + 0.432_951) + 0.238_081);
-    // The fit is for what a display could show: negative and endless light would come out anywhere.
+    // The fit is undefined outside the range of displayable light: it would map negative and infinite values
+    // arbitrarily.
     transform(&ACES_OUTPUT, transform(&ACES_INPUT, v.map(|v| v.clamp(0.0, 65504.0))).map(fit)).map(encode_srgb)
 }
 
-/// Which of [`TONE_MAPS`] is meant, of values that are allowed.
+/// Index of a tone map in [`TONE_MAPS`], after a check of both arguments.
 pub(crate) fn tone_map_index(exposure: f32, tone_map: &str) -> Result<usize> {
     let Some(index) = TONE_MAPS.iter().position(|name| *name == tone_map) else {
         return Err(Error::parameter("tonemap", format!("{tone_map:?}"), format!("one of {TONE_MAPS:?}")));
@@ -77,13 +78,16 @@ pub(crate) fn tone_map_index(exposure: f32, tone_map: &str) -> Result<usize> {
     Ok(index)
 }
 
-/// Turns pixels of `channels` (3 or 4) numbers, row by row in rows of `width`, into 8-bit sRGB.
+/// Converts pixels of `channels` (3 or 4) values, in rows of `width`, to 8-bit sRGB. `exposure` is in stops.
 ///
-/// Where there is alpha, the colours that come in are premultiplied and those that go out are not, as in a PNG: a tone map
-/// is for the radiance of what is there, however little it covers. Alpha is kept linear.
+/// Input colours with alpha are premultiplied; output colours are not, as in a PNG. The tone map applies to the
+/// radiance of the covered part, however small its coverage. Alpha stays linear.
 ///
-/// `dither` adds fixed blue noise of half a step to each side before rounding, the same to all colours: the mean over some
-/// pixels is right to a small part of a step, and grey stays grey. Whole steps, such as 0 and 255, are what they were.
+/// `dither` adds a fixed blue-noise pattern of half a quantization step to each side before rounding, the same to all
+/// channels: local means keep a small fraction of a step, and grey stays grey. Exact steps, such as 0 and 255, do not
+/// change.
+///
+/// Returns [`Error::Parameter`] for an unknown tone map or an exposure that is not finite.
 pub fn to_srgb8(
     pixels: &[f32],
     channels: usize,
@@ -100,14 +104,14 @@ pub fn to_srgb8(
     for (y, row) in pixels.chunks(channels * width.max(1)).enumerate() {
         for (x, pixel) in row.chunks_exact(channels).enumerate() {
             let rank = tile.get(y % BLUE_SIZE * BLUE_SIZE + x % BLUE_SIZE);
-            // A rank is that below its point: half a step of ranks is missing to the mean of 1/2.
+            // Ranks start at 0: half a step of ranks makes their mean 1/2.
             let threshold = rank.map_or(0.5, |rank| rank + 0.5 / (BLUE_SIZE * BLUE_SIZE) as f32);
             let gain = match pixel.get(3) {
                 Some(alpha) if *alpha > 0.0 => gain / alpha.min(1.0),
                 Some(_) => 0.0,
                 None => gain,
             };
-            // Nothing of endless light is no number, but nothing.
+            // Avoids NaN from 0 times infinity.
             let exposed = |v: f32| if gain > 0.0 { v * gain } else { 0.0 };
             let color = map([exposed(pixel[0]), exposed(pixel[1]), exposed(pixel[2])]);
             out.extend(color.map(|v| byte(v, threshold)));
@@ -117,14 +121,14 @@ pub fn to_srgb8(
     Ok(out)
 }
 
-/// How [`auto_exposure`] looks at a picture.
+/// Metering of [`auto_exposure`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Metering {
-    /// What the mean of the luminance becomes.
+    /// Target of the mean luminance.
     pub key: f64,
-    /// Percent of the pixels with light, from the darkest on, below which they are left out.
+    /// Percentile of the luminance below which pixels are left out, among pixels with light.
     pub low: f64,
-    /// That from which on they are.
+    /// Percentile from which on pixels are left out.
     pub high: f64,
 }
 
@@ -135,7 +139,10 @@ impl Default for Metering {
     }
 }
 
-/// The stops at which the geometric mean of a picture's luminance is the key (Reinhard et al. 2002); 0 where there is no light.
+/// Exposure in stops that brings the geometric mean of the luminance to the key (Reinhard et al. 2002); 0 for a picture
+/// without light.
+///
+/// Returns [`Error::Parameter`] for metering out of range.
 pub fn auto_exposure(pixels: &[f32], channels: usize, metering: Metering) -> Result<f64> {
     let Metering { key, low, high } = metering;
     if !(key > 0.0 && key.is_finite()) {
@@ -153,9 +160,9 @@ pub fn auto_exposure(pixels: &[f32], channels: usize, metering: Metering) -> Res
     }
     let place = |percent: f64| percent / 100.0 * light.len() as f64;
     let first = place(low).floor() as usize;
-    // One at least is left.
+    // At least one pixel remains.
     let end = (place(high).ceil() as usize).max(first + 1);
-    // What is left out need not be in order.
+    // The order of the excluded pixels does not matter.
     let (_, _, above) = light.select_nth_unstable_by(first, f64::total_cmp);
     let count = end - first;
     if count <= above.len() {

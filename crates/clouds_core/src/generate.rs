@@ -1,20 +1,20 @@
-//! Writes what other languages need to know of the parameters: `python/nubis/params.py` and `docs/parameters.md`.
-//! `make generate` (part of `make build`) puts them in place; a test keeps them current.
+//! Code generation for other languages: `python/nubis/params.py` and `docs/parameters.md`. `make generate`, a part of
+//! `make build`, writes the files; a test keeps them current.
 
 use std::fmt::Write as _;
 
 use crate::params::{Params, Quality};
 use crate::schema::{Block, Field, Type, Value};
 
-/// The generated files: path from the root of the repository, and content.
+/// Generated files: path from the root of the repository, and content.
 pub fn files() -> [(&'static str, String); 2] {
     [("python/nubis/params.py", python()), ("docs/parameters.md", manual())]
 }
 
-/// What the manuals say of the mixture of weathers.
-const WEATHER_MIX: &str = "Other weathers and their shares of the weather map: each from 0 to 1, together 1 at most; the \
-    rest is that of `weather`. All have the same `extent` and `edge`. Weathers change by it (thesis2018): see \
-    `WeatherBlend` and `lerp`.";
+/// Documentation of `weather_mix`.
+const WEATHER_MIX: &str = "Further weathers and their weights in the weather map. Each weight is from 0 to 1, their \
+    sum at most 1; `weather` has the rest. All weathers have the same `extent`, `edge` and `broad_extent`. A change of \
+    the weather is a mixture of varying weights (thesis2018): see `WeatherBlend` and `lerp`.";
 
 fn python_type(field: &Field) -> String {
     match field.ty {
@@ -30,7 +30,7 @@ fn python_type(field: &Field) -> String {
 }
 
 fn python_number(v: f64) -> String {
-    // Rust prints whole floats without a point, which Python would read as an int.
+    // Rust prints whole floats without a point, which Python reads as an int.
     if v == v.trunc() && v.abs() < 1e15 { format!("{v:.1}") } else { v.to_string() }
 }
 
@@ -45,12 +45,12 @@ fn python_value(value: &Value) -> String {
     }
 }
 
-/// The doc of a field without the space that `///` leaves in front.
+/// Documentation of a field without the leading space of `///`.
 fn about(field: &Field) -> &'static str {
     field.doc.trim()
 }
 
-/// Breaks `text` into lines of at most 100 columns with `indent` in front.
+/// Breaks `text` into indented lines of at most 100 columns.
 fn wrapped(text: &str, indent: &str) -> String {
     let mut out = String::new();
     let mut line = String::new();
@@ -69,7 +69,7 @@ fn wrapped(text: &str, indent: &str) -> String {
 }
 
 fn dataclass(out: &mut String, block: &dyn Block) {
-    // Blocks that can do more than hold parameters have a base of their own.
+    // A block with further methods has a base class of its own.
     let base = if block.type_name() == "Sun" { "SunBlock" } else { "Block" };
     let decorator = "@dataclass(frozen=True, kw_only=True, eq=False)";
     let _ = writeln!(out, "\n\n{decorator}\nclass {}({base}):", block.type_name());
@@ -90,7 +90,7 @@ fn dataclass(out: &mut String, block: &dyn Block) {
         let value = python_value(&block.get(index));
         let mut line = format!("    {}: {} = {value}", field.name, python_type(field));
         if line.len() > 100 {
-            // As `ruff format` breaks it.
+            // Line breaks of `ruff format`.
             line = line.replace("Literal[", "Literal[\n        ").replace("] = ", "\n    ] = ");
         }
         let _ = writeln!(out, "{line}");
@@ -117,7 +117,7 @@ fn python() -> String {
     dataclass(&mut out, &Quality::default());
     out.push_str(
         "\n\n@dataclass(frozen=True, kw_only=True, eq=False)\nclass Params(Root):\n    \
-         \"\"\"Everything that a sky looks like; the defaults are a fair-weather sky.\n\n    \
+         \"\"\"All parameters of a sky; the defaults are a fair-weather sky.\n\n    \
          Attributes\n    ----------\n",
     );
     for (name, block) in params.blocks() {
@@ -128,7 +128,8 @@ fn python() -> String {
     out.push_str(&wrapped(WEATHER_MIX, "        "));
     out.push_str("    volume : DensityGrid or None\n");
     out.push_str(&wrapped(
-        "A cloud of your own in place of all others: high clouds come with it where `high_clouds.with_volume` is True.",
+        "User-supplied extinction grid that replaces the procedural clouds, and the high clouds unless \
+         `high_clouds.with_volume` is True.",
         "        ",
     ));
     out.push_str("    \"\"\"\n\n");

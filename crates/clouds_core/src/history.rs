@@ -6,7 +6,7 @@ use crate::gpu::Gpu;
 use crate::params::{self, Params};
 use crate::scene_depth::{SceneDepth, SceneTextures};
 use crate::shot::Shot;
-use crate::targets::TemporalTargets;
+use crate::targets::{Targets, Temporal};
 use crate::wind::Advection;
 
 /// The frame before.
@@ -39,6 +39,13 @@ impl Past {
             || old.volume != new.volume
             || (old.light.model, old.light.phase) != (new.light.model, new.light.phase)
             || old.atmosphere.planet_radius != new.atmosphere.planet_radius
+    }
+
+    /// Whether the next frame may be reprojected from this one: there is no cut, clouds are marched in both or in neither,
+    /// and the size is the same where a scene of the user has edges.
+    pub fn serves(&self, shot: &Shot<'_>, cloudless: bool, size: [u32; 2]) -> bool {
+        let same_size = [self.frame.view.width, self.frame.view.height] == size;
+        !self.is_cut(shot) && self.frame.cloudless == cloudless && (self.is_bare(shot.scene.is_some()) || same_size)
     }
 
     /// Whether the edges of a scene are nowhere, then and now: only then may the frame before have had other pixels.
@@ -109,13 +116,7 @@ impl Accumulator {
 
 impl Frame {
     /// Notes what has changed since the frame before.
-    pub(crate) fn follow(
-        &mut self,
-        shot: &Shot<'_>,
-        params: &Params,
-        last: Option<&Past>,
-        resized: Option<&TemporalTargets>,
-    ) {
+    pub(crate) fn follow(&mut self, shot: &Shot<'_>, params: &Params, last: Option<&Past>, resized: Option<&Targets>) {
         let Some(last) = last else { return };
         let carried = Advection::between((&last.params, last.time), (params, shot.time));
         self.set_previous(&last.frame, shot.camera.eye - last.camera.eye, &carried);
@@ -130,29 +131,25 @@ impl Frame {
     }
 }
 
-/// Uploads the user's scene of a frame and that of the frame before. Where one was and is no more, or is and was not, there is
-/// nothing.
+/// Uploads the scene of a strip and, in an animation, that of the previous frame. Where only one of the two has a scene,
+/// that of the other is infinitely far away.
 pub(crate) fn upload_scenes(
-    kept: &mut Option<SceneTextures>,
-    targets: &mut TemporalTargets,
+    textures: &SceneTextures,
+    temporal: Option<&mut Temporal>,
     gpu: &Gpu,
     scene: Option<SceneDepth<'_>>,
-    last: Option<&Past>,
+    past: Option<&Past>,
     frame: &Frame,
 ) {
-    if !frame.scene {
-        return;
+    let [first, pixels] =
+        [frame.dispatch.strip_row, frame.dispatch.strip_rows].map(|rows| rows as usize * frame.view.width as usize);
+    let strip = first..first + pixels;
+    let nothing = vec![f32::INFINITY; if temporal.is_some() { strip.end } else { 0 }];
+    textures.upload(gpu, &scene.unwrap_or(SceneDepth { distance: &nothing, color: None }), strip.clone());
+    let Some(Temporal { scene_before, .. }) = temporal else { return };
+    if !scene_before.holds(pixels as u64, false) {
+        *scene_before = SceneTextures::new(gpu, pixels as u64, false);
     }
-    let pixels = frame.view.width * frame.view.height;
-    let nothing = vec![f32::INFINITY; pixels as usize];
-    let now = scene.unwrap_or(SceneDepth { distance: &nothing, color: None });
-    let before = last.and_then(|last| last.scene.as_deref()).unwrap_or(&nothing);
-    if !targets.scene_before.holds(pixels.into(), false) {
-        targets.scene_before = SceneTextures::new(gpu, pixels.into(), false);
-    }
-    let whole = 0..pixels as usize;
-    targets.scene_before.upload(gpu, &SceneDepth { distance: before, color: None }, whole.clone());
-    if let Some(textures) = SceneTextures::fit(kept, gpu, Some(now), pixels) {
-        textures.upload(gpu, &now, whole);
-    }
+    let distance = past.and_then(|past| past.scene.as_deref()).unwrap_or(&nothing);
+    scene_before.upload(gpu, &SceneDepth { distance, color: None }, strip);
 }

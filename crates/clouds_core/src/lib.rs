@@ -1,7 +1,7 @@
 //! Volumetric clouds by ray marching on Vulkan compute.
 //!
-//! [`Params`] says what a sky looks like and [`Quality`] how it is computed; [`Renderer`] makes a picture of it, in one
-//! function that reads top to bottom. `ARCHITECTURE.md` follows a frame through the files.
+//! [`Params`] describes a sky, [`Quality`] the numerical method. [`Renderer`] renders a [`Shot`]: camera, parameters
+//! and time. `ARCHITECTURE.md` follows a frame through the files.
 
 mod blue_noise;
 pub mod camera;

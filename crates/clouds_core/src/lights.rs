@@ -1,5 +1,5 @@
-//! Pictures by the light of sun, moon or both. Radiance is linear in its sources, so that one by both is the sum of two, each
-//! with one of them, whose history is its own.
+//! Rendering with the light of sun, moon or both. Radiance is linear in the light sources: a picture with both is the
+//! sum of two pictures with one source each. Each source has a history of its own.
 
 use std::mem;
 
@@ -12,24 +12,26 @@ use crate::gpu::Interrupt;
 use crate::params::{Moon, Params, Sun};
 use crate::passes::display::Screen;
 use crate::picture::Picture;
+use crate::plan::Target;
 use crate::renderer::Renderer;
 use crate::scene_depth::SceneDepth;
 use crate::shot::Shot;
 
-/// Light that is fainter than this share of the other source's, or of the night's, is left out.
+/// Threshold below which a light source is left out: its strength relative to the other source or to the night sky.
 const NEGLIGIBLE: f64 = 1e-4;
-/// By how many powers of two light falls with each degree that its source is under the horizon. Measured, the brightest of sky
-/// and clouds: 9, 17, 26 and 34 at 6, 12, 18 and 24 degrees.
+/// Decay of the light with the depression of its source below the horizon, in powers of two per degree. Measured on the
+/// brightest of sky and clouds: 9, 17, 26 and 34 powers at 6, 12, 18 and 24 degrees.
 const DUSK: f64 = 1.4;
 
-/// The skies whose pictures are one sky's together: that of the sun, and that of the moon. What comes from neither is in the first.
+/// Parameters of the pictures to add up: one lit by the sun, one by the moon. The first of them includes night sky and
+/// ambient light.
 struct Lights {
     pub sun: Option<Params>,
     pub moon: Option<Params>,
 }
 
 impl Lights {
-    /// Of a sky as it is seen in a frame.
+    /// Significant light sources of a sky in a frame.
     pub fn new(params: &Params, frame: &Frame) -> Self {
         let strength = |direction: DVec3, light: [f32; 3]| {
             let under = -frame.height_of(direction) - f64::from(frame.view.horizon_dip).to_degrees();
@@ -51,7 +53,7 @@ impl Lights {
     }
 }
 
-/// The same sky with the moon's light in place of the sun's.
+/// Parameters with the moon as the light source in place of the sun.
 fn moonlit(params: &Params) -> Params {
     let Moon { elevation, azimuth, .. } = params.moon;
     let sun = Sun { elevation, azimuth, irradiance: params.moon.light(), visible: false };
@@ -59,32 +61,38 @@ fn moonlit(params: &Params) -> Params {
 }
 
 impl Renderer {
-    /// A still: finished in one call, without history or noise to wait for. `layers` fills those of the picture beside its image
-    /// too.
+    /// Renders a still picture, finished in one call, without history or remaining noise. `layers` fills all layers of
+    /// the picture, not the image alone.
+    ///
+    /// Returns [`Error::Parameter`] for a value that is not allowed.
     pub fn render(&mut self, shot: &Shot<'_>, layers: bool, interrupt: Interrupt<'_>) -> Result<Picture> {
-        let still = |lit: &mut Self, shot: &Shot<'_>| lit.still(shot, layers, 0, interrupt);
+        let still =
+            |lit: &mut Self, shot: &Shot<'_>| lit.frame(shot, Target::Still { layers, first_sample: 0 }, interrupt);
         let Lights { sun, moon } = self.lights(shot)?;
         let Some(moon) = moon else { return still(self, &shot.of(sun.as_ref().unwrap_or(shot.params))) };
         let first = sun.map(|sun| still(self, &shot.of(&sun))).transpose()?;
-        let black = black(shot, first.is_some());
-        let second = self.by_moon(first.is_some(), |lit| still(lit, &without(shot, &moon, black.as_deref())))?;
+        let zero = zero_scene_color(shot, first.is_some());
+        let second =
+            self.on_moonlight_renderer(first.is_some(), |lit| still(lit, &relit(shot, &moon, zero.as_deref())))?;
         Ok(match first {
-            Some(first) => first.and(&second),
+            Some(first) => first.plus(&second),
             None => second,
         })
     }
 
-    /// The next frame of an animation: a sixteenth of its pixels is marched, the others follow the clouds from the frame
-    /// before. The first frame, and the first after a cut, is a still. Returns the image of [`Renderer::render`].
+    /// Renders the next frame of an animation: one pixel in sixteen is marched, the others are reprojected from the
+    /// previous frame. The first frame, and the first after a cut, is a still. Returns the image of
+    /// [`Renderer::render`].
     ///
-    /// Beside edges of the user's scene, now or in the frame before, every pixel is marched.
+    /// Every pixel along edges of the user's scene, in this frame or the previous one, is marched.
     ///
-    /// Where rays converge or paths are traced, every frame is a still; a static shot goes on tracing.
+    /// With the reference integrator and with path tracing every frame is a still; a static shot continues to
+    /// accumulate paths.
     pub fn animate(&mut self, shot: &Shot<'_>, interrupt: Interrupt<'_>) -> Result<Vec<f32>> {
         self.lit_frame(shot, None, interrupt)
     }
 
-    /// The same onto a screen of the size of the pictures, without bringing it to memory.
+    /// Renders the next frame of an animation to a screen texture of the picture's size, without a readback.
     pub fn animate_onto(&mut self, screen: &Screen, shot: &Shot<'_>, interrupt: Interrupt<'_>) -> Result<()> {
         if screen.size() != self.size {
             let [width, height] = screen.size();
@@ -102,17 +110,17 @@ impl Renderer {
         };
         let Some(sun) = sun else {
             self.forget();
-            return self.by_moon(false, |lit| lit.next_frame(&shot.of(&moon), screen, interrupt));
+            return self.on_moonlight_renderer(false, |lit| lit.next_frame(&shot.of(&moon), screen, interrupt));
         };
         let mut image = self.next_frame(&shot.of(&sun), None, interrupt)?;
-        let black = black(shot, true);
-        let make = |lit: &mut Self| lit.next_frame(&without(shot, &moon, black.as_deref()), None, interrupt);
-        add_light(&mut image, &self.by_moon(true, make)?);
+        let zero = zero_scene_color(shot, true);
+        let make = |lit: &mut Self| lit.next_frame(&relit(shot, &moon, zero.as_deref()), None, interrupt);
+        add_light(&mut image, &self.on_moonlight_renderer(true, make)?);
         screen.map_or(Ok(()), |screen| screen.write(&self.gpu, &image))?;
         Ok(image)
     }
 
-    /// What lights a sky.
+    /// Significant light sources of a shot.
     fn lights(&mut self, shot: &Shot<'_>) -> Result<Lights> {
         if !shot.params.moon.exists() {
             return Ok(Lights { sun: Some(shot.params.clone()), moon: None });
@@ -121,8 +129,9 @@ impl Renderer {
         Ok(Lights::new(shot.params, &frame))
     }
 
-    /// What the renderer of moonlight makes; its times are a part of ours, or all of them.
-    fn by_moon<T>(&mut self, part: bool, make: impl FnOnce(&mut Self) -> Result<T>) -> Result<T> {
+    /// Runs `make` on the renderer of moonlight. Its timings are added to ours if the picture is only a `part`, and
+    /// replace ours otherwise.
+    fn on_moonlight_renderer<T>(&mut self, part: bool, make: impl FnOnce(&mut Self) -> Result<T>) -> Result<T> {
         let mut lit = match self.moonlit.take() {
             Some(lit) => lit,
             None => Box::new(Self::on(self.gpu.clone(), self.size, self.quality.clone())),
@@ -140,31 +149,31 @@ impl Renderer {
 }
 
 impl Picture {
-    /// The picture of the same sky by the light of both.
-    fn and(mut self, other: &Self) -> Self {
+    /// Sum of two pictures of the same sky with one light source each.
+    fn plus(mut self, other: &Self) -> Self {
         add_light(&mut self.image, &other.image);
         add_light(&mut self.sky, &other.sky);
         self.samples.iter_mut().zip(&other.samples).for_each(|(sum, more)| *sum += more);
-        // Both have the same paths, so that their errors may be of one sign.
+        // Both pictures trace the same paths, so that their errors may be correlated.
         self.uncertainty.iter_mut().zip(&other.uncertainty).for_each(|(sum, more)| *sum += more);
         self
     }
 }
 
-/// Adds the light of another picture of the same sky, whose alpha is the same.
+/// Adds the light of another picture of the same sky, which has the same alpha.
 fn add_light(image: &mut [f32], other: &[f32]) {
     for (sum, more) in image.chunks_exact_mut(4).zip(other.chunks_exact(4)) {
         sum[..3].iter_mut().zip(more).for_each(|(sum, more)| *sum += more);
     }
 }
 
-/// The radiance of the user's scene where another picture has it already: none.
-fn black(shot: &Shot<'_>, known: bool) -> Option<Vec<f32>> {
-    shot.scene.and_then(|scene| scene.color).filter(|_| known).map(|color| vec![0.0; color.len()])
+/// Zero radiance of the user's scene for the second picture, if the first one includes the scene.
+fn zero_scene_color(shot: &Shot<'_>, in_first: bool) -> Option<Vec<f32>> {
+    shot.scene.and_then(|scene| scene.color).filter(|_| in_first).map(|color| vec![0.0; color.len()])
 }
 
-/// The shot of a sky with a scene of another radiance, where there is one.
-fn without<'a>(shot: &Shot<'a>, params: &'a Params, color: Option<&'a [f32]>) -> Shot<'a> {
+/// Shot with other parameters and, if given, another radiance of the scene.
+fn relit<'a>(shot: &Shot<'a>, params: &'a Params, color: Option<&'a [f32]>) -> Shot<'a> {
     let scene = shot.scene.map(|scene| SceneDepth { distance: scene.distance, color: color.or(scene.color) });
     Shot { params, scene, ..*shot }
 }

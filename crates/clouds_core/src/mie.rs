@@ -1,24 +1,27 @@
-//! The light that cloud droplets scatter, by Mie's theory (Bohren and Huffman 1983, chapter 4), as an eye sees it: over a
-//! range of sizes and colours, which smooth the ripples of a single sphere away.
+//! Mie scattering by cloud droplets (Bohren and Huffman 1983, chapter 4): the phase function for human vision, averaged
+//! over a distribution of sizes and over wavelengths, which smooths the ripples of a single sphere.
 
 use std::f64::consts::PI;
 use std::thread;
 
-/// Of what is computed here: part of the key of what is kept on disk. Count it up with each change.
+/// Version of the computation, part of the key of the disk cache. Increment it with each change.
 pub(crate) const VERSION: u32 = 1;
 
-/// Effective variance of the droplets' sizes (Hansen and Travis 1974): narrow, as where glories are seen (Mayer et al. 2004).
+/// Effective variance of the droplet sizes (Hansen and Travis 1974): narrow, as where glories are observed (Mayer et
+/// al. 2004).
 const VARIANCE: f64 = 0.05;
-/// Sizes of which the mean is taken, at each wavelength others, times the diameter in µm: the smaller the spheres, the
-/// more unlike are those of which as many are taken, and the less work is each.
+/// Number of sampled sizes per wavelength times the effective diameter in µm. Each wavelength has other sizes. Small
+/// spheres need more samples, as neighbouring sizes differ more, and each takes less time.
 const SIZES: f64 = 3200.0;
-/// Between which shares of the effective radius they lie: the rest of the droplets scatters less than 1e-4 of the light.
+/// Range of the sampled radii as fractions of the effective radius. Droplets outside it scatter less than 1e-4 of the
+/// light.
 const SMALLEST: f64 = 0.2;
 const LARGEST: f64 = 2.4;
-/// Wavelengths in µm, and how bright the eye sees them (CIE 1924 photopic).
+/// Wavelengths in µm and their luminous efficiency (CIE 1924 photopic).
 const WAVELENGTHS: [(f64, f64); 5] = [(0.47, 0.091), (0.51, 0.503), (0.55, 0.995), (0.59, 0.757), (0.63, 0.265)];
 
-/// The refractive index of water at 20 °C (Daimon and Masumura 2007). It absorbs none of the light that is seen.
+/// Refractive index of water at 20 °C at a wavelength in µm (Daimon and Masumura 2007). Water does not absorb visible
+/// light.
 fn water(wavelength: f64) -> f64 {
     const TERMS: [(f64, f64); 4] = [
         (5.684_027_565e-1, 5.101_829_712e-3),
@@ -30,11 +33,12 @@ fn water(wavelength: f64) -> f64 {
     (1.0 + TERMS.iter().map(|(a, pole)| a * square / (square - pole)).sum::<f64>()).sqrt()
 }
 
-/// The coefficients a_n and b_n, n from 1, as real and imaginary part, of a sphere of size parameter `x` and real index `m`.
+/// Mie coefficients a_n and b_n, n from 1, as real and imaginary parts, of a sphere of size parameter `x` and real
+/// refractive index `m`.
 fn coefficients(x: f64, m: f64) -> Vec<[f64; 4]> {
-    let count = (x + 4.05 * x.cbrt() + 2.0) as usize; // Wiscombe 1980
+    let count = (x + 4.05 * x.cbrt() + 2.0) as usize; // number of terms (Wiscombe 1980)
     let mx = m * x;
-    // The logarithmic derivative of psi inside the sphere, downward: upward it loses its digits.
+    // Logarithmic derivative of psi inside the sphere by downward recurrence: upward recurrence loses precision.
     let mut inside = vec![0.0; count + 1];
     let mut d = 0.0;
     for n in (1..=count.max(mx as usize) + 16).rev() {
@@ -51,7 +55,7 @@ fn coefficients(x: f64, m: f64) -> Vec<[f64; 4]> {
             psi = [psi[1], (2.0 * order - 1.0) / x * psi[1] - psi[0]];
             chi = [chi[1], (2.0 * order - 1.0) / x * chi[1] - chi[0]];
             let coefficient = |factor: f64| {
-                // p / (p - i q), in which xi is psi - i chi.
+                // The coefficient is p / (p - i q), with xi = psi - i chi.
                 let p = factor * psi[1] - psi[0];
                 let q = factor * chi[1] - chi[0];
                 let norm = p * p + q * q;
@@ -64,14 +68,14 @@ fn coefficients(x: f64, m: f64) -> Vec<[f64; 4]> {
         .collect()
 }
 
-/// The intensity that the spheres scatter at some angles (radians), in any unit. `spheres` are size parameter, refractive
-/// index and weight.
+/// Intensity scattered by spheres at angles in radians, in arbitrary units. Each sphere is a size parameter, a
+/// refractive index and a weight.
 fn intensity(spheres: &[(f64, f64, f64)], angles: &[f64]) -> Vec<f64> {
     let mu: Vec<_> = angles.iter().map(|angle| angle.cos()).collect();
     let count = mu.len();
     let mut sum = vec![0.0; count];
     for &(x, m, weight) in spheres {
-        // Of S1 and S2 real and imaginary parts; pi_n and the one before.
+        // Real and imaginary parts of S1 and S2; pi_n and its predecessor.
         let [mut s1, mut s1i, mut s2, mut s2i, mut before] =
             [const { Vec::new() }; 5].map(|_: Vec<f64>| vec![0.0; count]);
         let mut pi = vec![1.0; count];
@@ -98,7 +102,7 @@ fn intensity(spheres: &[(f64, f64, f64)], angles: &[f64]) -> Vec<f64> {
     sum
 }
 
-/// The phase function of droplets whose effective diameter is `diameter` µm at some angles (radians), in any unit.
+/// Phase function of droplets of an effective diameter in µm at angles in radians, in arbitrary units.
 pub(crate) fn phase(diameter: f64, angles: &[f64]) -> Vec<f64> {
     let effective = 0.5 * diameter;
     let sizes = (SIZES / diameter) as usize;
@@ -107,14 +111,14 @@ pub(crate) fn phase(diameter: f64, angles: &[f64]) -> Vec<f64> {
         for i in 0..sizes {
             let offset = (colour as f64 + 0.5) / WAVELENGTHS.len() as f64;
             let share = SMALLEST + (LARGEST - SMALLEST) * (i as f64 + offset) / sizes as f64;
-            // The gamma distribution of Hansen 1971, divided by its value at 1.
+            // Gamma distribution (Hansen 1971), divided by its value at the effective radius.
             let droplets = (((1.0 - 3.0 * VARIANCE) * share.ln() + 1.0 - share) / VARIANCE).exp();
-            // Intensities are in units of the wave number's square.
+            // Intensities are in units of the squared wave number.
             let weight = droplets * seen * wavelength * wavelength;
             spheres.push((2.0 * PI * share * effective / wavelength, water(wavelength), weight));
         }
     }
-    // A few angles to a thread, all that they need in its cache.
+    // Few angles per thread, so that its working set fits its cache.
     let threads = thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let chunk = angles.len().div_ceil(threads).clamp(1, 256);
     let chunks: Vec<_> = angles.chunks(chunk).collect();

@@ -3,7 +3,7 @@
 use crate::frame::Frame;
 use crate::gpu::{Download, Recorder};
 use crate::grid::{SampleGrid, TILE};
-use crate::targets::{StillTargets, count};
+use crate::targets::{Targets, count};
 
 /// A picture, row by row.
 #[derive(Clone, Debug, Default)]
@@ -22,15 +22,15 @@ pub struct Picture {
 }
 
 /// Brings a strip of a still back.
-pub(crate) fn download(rec: &mut Recorder<'_>, frame: &Frame, targets: &StillTargets, layers: bool) {
-    let StillTargets { cloud_buffers, output, rays, .. } = targets;
+pub(crate) fn download(rec: &mut Recorder<'_>, frame: &Frame, targets: &Targets, layers: bool) {
+    let Targets { output, rays, .. } = targets;
     let pixels = count([frame.view.width, frame.dispatch.rows]);
     rec.download(&output.image, 0, 16 * pixels);
     if layers {
         rec.download(&output.sky, 0, 16 * pixels);
         rec.download(&output.depth, 0, 4 * pixels);
         let samples = frame.grid.strip(frame.dispatch.rows).samples();
-        rec.download(&cloud_buffers.samples, 0, 4 * count(samples));
+        rec.download(&targets.clouds().samples, 0, 4 * count(samples));
         if let Some(rays) = rays {
             rec.download(&rays.uncertainty, 0, 16 * pixels);
         }

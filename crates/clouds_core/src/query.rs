@@ -1,4 +1,4 @@
-//! Answers about a sky without a picture of it.
+//! Queries that need no picture: density, transmittance, optical depth, shadow map, weather map, and probes of shaders.
 
 use std::sync::Arc;
 
@@ -18,11 +18,11 @@ use crate::renderer::Renderer;
 use crate::shot::Shot;
 use crate::specialization;
 
-/// Most texels along a side of the user's shadow map.
-const MOST_SHADOW: u32 = 8192;
+/// Maximum number of texels along a side of the user's shadow map.
+const MAX_SHADOW_SIZE: u32 = 8192;
 
 impl Renderer {
-    /// Extinction in 1/m at world points: the field that [`Renderer::render`] marches.
+    /// Extinction in 1/m at world points in m: the field that [`Renderer::render`] marches.
     pub fn density(
         &mut self,
         at: &[[f64; 3]],
@@ -30,10 +30,10 @@ impl Renderer {
         time: f64,
         interrupt: Interrupt<'_>,
     ) -> Result<Vec<f32>> {
-        self.ask("extinction_at_points", at, params, time, interrupt)
+        self.query_points("extinction_at_points", at, params, time, interrupt)
     }
 
-    /// The share of direct sunlight that reaches world points through the clouds; 0 where the ground hides the sun.
+    /// Transmittance of the clouds toward the sun at world points in m; 0 where the ground hides the sun.
     pub fn sun_transmittance(
         &mut self,
         at: &[[f64; 3]],
@@ -41,10 +41,10 @@ impl Renderer {
         time: f64,
         interrupt: Interrupt<'_>,
     ) -> Result<Vec<f32>> {
-        self.ask("sun_transmittance_at_points", at, params, time, interrupt)
+        self.query_points("sun_transmittance_at_points", at, params, time, interrupt)
     }
 
-    /// The optical depth of all clouds from an eye along directions; -1 where the ground is in the way.
+    /// Optical depth of all clouds along rays from an eye; -1 where the ground is hit.
     pub fn depth_along(
         &mut self,
         eye: DVec3,
@@ -57,12 +57,12 @@ impl Renderer {
         let camera = Camera::equirect(eye)?;
         let points: Vec<_> =
             directions.iter().map(|d| DVec3::from_array(*d).as_vec3().normalize().extend(0.0).to_array()).collect();
-        let kernel = Which::Named(("points", "depth_along_directions"), self.of_points(params));
+        let kernel = Which::Named(("points", "depth_along_directions"), self.points_specialization(params));
         let answers = self.run_points(&kernel, &Shot::new(&camera, params, time), &points, points::CHUNK, interrupt)?;
         Ok(answers.iter().map(|answer| answer[0]).collect())
     }
 
-    fn ask(
+    fn query_points(
         &mut self,
         entry: &'static str,
         at: &[[f64; 3]],
@@ -72,22 +72,24 @@ impl Renderer {
     ) -> Result<Vec<f32>> {
         check_fork()?;
         let Some(first) = at.first() else { return Ok(Vec::new()) };
-        // Positions go to the GPU relative to the first: f32 keeps millimetres a few kilometres around it.
+        // Positions on the GPU are relative to the first point: f32 keeps millimetres within a few kilometres of it.
         let eye = DVec3::from_array(*first);
         let camera = Camera::equirect(eye)?;
         let offset = |p: &[f64; 3]| (DVec3::from_array(*p) - eye).as_vec3().extend(0.0).to_array();
         let points: Vec<_> = at.iter().map(offset).collect();
-        let kernel = Which::Named(("points", entry), self.of_points(params));
+        let kernel = Which::Named(("points", entry), self.points_specialization(params));
         let answers = self.run_points(&kernel, &Shot::new(&camera, params, time), &points, points::CHUNK, interrupt)?;
         Ok(answers.iter().map(|answer| answer[0]).collect())
     }
 
-    fn of_points(&self, params: &Params) -> Arc<Specialization> {
+    fn points_specialization(&self, params: &Params) -> Arc<Specialization> {
         specialization::of_points(params, &self.quality)
     }
 
-    /// The share of direct sunlight that reaches a level square around `center` (east, north and altitude, m): `size` by `size`
-    /// numbers, row 0 in the north. `extent` is its side, m.
+    /// Transmittance of the clouds toward the sun on a horizontal square around `center` (east, north and altitude, m).
+    /// `extent` is the side of the square in m. The map has `size` by `size` values, row 0 in the north.
+    ///
+    /// Returns [`Error::Parameter`] for a value out of range.
     pub fn shadow_map(
         &mut self,
         params: &Params,
@@ -96,10 +98,10 @@ impl Renderer {
         (extent, size): (f64, u32),
         interrupt: Interrupt<'_>,
     ) -> Result<Vec<f32>> {
-        if !(1..=MOST_SHADOW).contains(&size) {
-            return Err(Error::parameter("size", size, format!("a whole number from 1 to {MOST_SHADOW}")));
+        if !(1..=MAX_SHADOW_SIZE).contains(&size) {
+            return Err(Error::parameter("size", size, format!("a whole number from 1 to {MAX_SHADOW_SIZE}")));
         }
-        // Written so that NaN fails it.
+        // The negation rejects NaN.
         if !(1.0..=1e7).contains(&extent) {
             return Err(Error::parameter("extent", extent, "from 1 to 10000000 m"));
         }
@@ -111,19 +113,19 @@ impl Renderer {
             return Err(Error::parameter("center", place, "2 numbers from -100000000 to 100000000 m"));
         }
         let camera = Camera::equirect(DVec3::from_array(center))?;
-        let room = self.gpu.buffer("shadow_out", 4 * u64::from(size) * u64::from(size));
+        let map_buffer = self.gpu.buffer("shadow_out", 4 * u64::from(size) * u64::from(size));
         let (mut rec, mut frame) = self.record(&Shot::new(&camera, params, time), interrupt)?;
         [frame.view.width, frame.view.height] = [size; 2];
         [frame.dispatch.march_width, frame.dispatch.strip_rows] = [size; 2];
         frame.sky.shadow_texel = (extent / f64::from(size)) as f32;
-        shadow::map(&mut rec, &frame, size, &room);
-        rec.download(&room, 0, room.size());
+        shadow::map(&mut rec, &frame, size, &map_buffer);
+        rec.download(&map_buffer, 0, map_buffer.size());
         let map = rec.submit()?;
         Ok(map[0].numbers()[..(size * size) as usize].to_vec())
     }
 
-    /// The weather map as the march reads it, baked, the user's own or mixed: its width and height in texels, and three
-    /// numbers for each of them, coverage, type and precipitation, row 0 in the north.
+    /// Weather map that the march reads, baked, user-supplied or mixed: width and height in texels, and coverage, type
+    /// and precipitation of each texel, row 0 in the north.
     pub fn weather_map(&mut self, params: &Params, interrupt: Interrupt<'_>) -> Result<([u32; 2], Vec<f32>)> {
         let camera = Camera::equirect(DVec3::ZERO)?;
         let (frame, params) = Shot::new(&camera, params, 0.0).checked(self.size, &self.quality)?;
@@ -141,8 +143,10 @@ impl Renderer {
         Ok(([texture.width(), texture.height()], numbers.collect()))
     }
 
-    /// The value of a WGSL `expression` of `x: vec4f` for each input, with the shaders named by `imports` in scope and
-    /// the eye at the origin: how tests reach single shader functions.
+    /// Value of a WGSL `expression` of `x: vec4f` for each input, with the modules of `imports` in scope and the camera
+    /// at `eye` at `time` in s. Tests call single shader functions with it.
+    ///
+    /// Returns [`Error::Parameter`] for a module that does not exist and [`Error::Device`] for an invalid expression.
     pub fn probe(
         &mut self,
         imports: &[String],
@@ -162,9 +166,13 @@ impl Renderer {
         );
         let linked = Linked::from_source(&source, self.gpu.generated)
             .map_err(|error| Error::parameter("imports", error, "shader names"))?;
-        let kernel = Program::from_linked(&self.gpu, &linked)?.compile(&self.gpu, "probe", &self.of_points(params))?;
+        let kernel = Program::from_linked(&self.gpu, &linked)?.compile(
+            &self.gpu,
+            "probe",
+            &self.points_specialization(params),
+        )?;
         let camera = Camera::equirect(eye)?;
-        // At once, so that what is timed fills the device.
+        // A single dispatch, so that timed probes fill the device.
         let kernel = Which::Made(Arc::new(kernel));
         self.run_points(&kernel, &Shot::new(&camera, params, time), inputs, 1 << 20, interrupt)
     }
@@ -181,7 +189,7 @@ impl Renderer {
         points::run(&mut rec, &frame, kernel, points, most)
     }
 
-    /// A recording in which the LUTs of a sky are bound, and its frame.
+    /// Recording with the LUTs of a sky bound, and its frame.
     fn record<'a>(&'a mut self, shot: &Shot<'_>, interrupt: Interrupt<'a>) -> Result<(Recorder<'a>, Frame)> {
         let (mut frame, params) = shot.checked(self.size, &self.quality)?;
         frame.light_shafts = false;

@@ -6,20 +6,20 @@ use std::thread;
 
 use crate::blue_noise;
 use crate::error::{Error, Result};
+use crate::frame::Frame;
 use crate::gpu::Recorder;
 use crate::gpu::{Gpu, Interrupt, Timings, check_fork};
 use crate::grid;
 use crate::history::{Accumulator, Past, upload_scenes};
 use crate::luts::Luts;
 use crate::params::{Model, Quality};
-use crate::passes::composite::Parts;
 use crate::passes::display::{self, Screen};
 use crate::passes::{composite, march, path, reference, reproject};
 use crate::picture::{Picture, download};
-use crate::plan::{Integrator, Plan};
+use crate::plan::{Integrator, Plan, Target};
 use crate::scene_depth::SceneTextures;
 use crate::shot::{Shot, check_size};
-use crate::targets::{StillTargets, TemporalTargets, count, fit_temporal};
+use crate::targets::{Targets, count};
 use crate::wind::Going;
 
 /// What [`Renderer::history_length`] says of a pixel that has had a ray of its own: frames in which every pixel is marched once.
@@ -32,9 +32,9 @@ pub struct Renderer {
     pub(crate) quality: Quality,
     pub(crate) luts: Luts,
     scene_depth: Option<SceneTextures>,
-    still: Option<StillTargets>,
-    temporal: Option<TemporalTargets>,
-    last: Option<Past>,
+    still: Option<Targets>,
+    animation: Option<Targets>,
+    past: Option<Past>,
     going: Going,
     accumulator: Option<Accumulator>,
     /// Makes what the moon lights, where that is seen.
@@ -65,8 +65,8 @@ impl Renderer {
             luts: Luts::new(&gpu),
             scene_depth: None,
             still: None,
-            temporal: None,
-            last: None,
+            animation: None,
+            past: None,
             going: Going::default(),
             accumulator: None,
             moonlit: None,
@@ -85,7 +85,7 @@ impl Renderer {
     pub fn memory(&self) -> Vec<(&'static str, &'static str, u64)> {
         let mut held: Vec<_> = self.lut_memory.iter().map(|&(name, bytes)| ("scene", name, bytes)).collect();
         let still = self.still.iter().flat_map(|targets| targets.bindings()).map(|held| ("still", held));
-        let temporal = self.temporal.iter().flat_map(|targets| targets.bindings()).map(|held| ("animation", held));
+        let temporal = self.animation.iter().flat_map(|targets| targets.bindings()).map(|held| ("animation", held));
         held.extend(still.chain(temporal).map(|(owner, (name, binding))| (owner, name, binding.bytes())));
         held.extend(self.moonlit.iter().flat_map(|lit| lit.memory()));
         held
@@ -115,123 +115,90 @@ impl Renderer {
         self.size
     }
 
-    /// A still by one light; `first_sample` is the number of the first path of each pixel.
-    pub(crate) fn still(
-        &mut self,
-        shot: &Shot<'_>,
-        layers: bool,
-        first_sample: u32,
-        interrupt: Interrupt<'_>,
-    ) -> Result<Picture> {
+    /// One frame by one light: checked, planned, recorded, submitted.
+    pub(crate) fn frame(&mut self, shot: &Shot<'_>, target: Target<'_>, interrupt: Interrupt<'_>) -> Result<Picture> {
         let (mut frame, params) = shot.checked(self.size, &self.quality)?;
-        frame.view.first_sample = first_sample;
-        frame.ground_shadow = (shot.background || layers) && frame.has_ground_shadow(shot.camera, &params);
-        let plan = Plan::new(&mut frame, &params, &self.quality, false, layers);
+        frame.ground_shadow = (shot.background || target.layers()) && frame.has_ground_shadow(shot.camera, &params);
+        let past = self.take_past(&shot.of(&params), target, &mut frame);
+        let plan = Plan::new(&mut frame, &params, &self.quality, target);
+        let past = past.filter(|past| past.is_bare(shot.scene.is_some()) || past.frame.grid == frame.grid);
+        let kept = if target.is_animation() { &mut self.animation } else { &mut self.still };
+        let (targets, resized) = Targets::fit(kept, &self.gpu, &frame, &plan, target.is_animation());
+        let resized = resized.filter(|_| past.is_some());
+        frame.follow(shot, &params, past.as_ref(), resized.as_ref());
+
         self.timings = Timings::default();
         let mut rec = Recorder::new(&self.gpu, &mut self.timings, interrupt);
-        let inputs = plan.inputs(shot, &params, &self.quality, &frame);
-        self.luts.update(&mut rec, &inputs)?;
+        self.luts.update(&mut rec, &plan.inputs(shot, &params, &self.quality, &frame))?;
+        let pixels = frame.view.width * plan.most_rows();
         let scene =
-            SceneTextures::fit(&mut self.scene_depth, &self.gpu, shot.scene, frame.view.width * plan.most_rows());
+            SceneTextures::fit(&mut self.scene_depth, &self.gpu, frame.scene.then(|| shot.scene_or_none()), pixels);
         rec.bind(scene.map_or(Vec::new(), SceneTextures::bindings));
         self.lut_memory = rec.held();
 
         let mut picture = Picture::default();
         for strip in &plan.strips {
-            plan.set_strip(&mut frame, &self.quality, strip);
-            let targets = StillTargets::fit(&mut self.still, &self.gpu, &frame, plan.integrator);
-            let StillTargets { ray_list, cloud_buffers, output, background_corners, rays, .. } = targets;
-            if let (Some(textures), Some(given)) = (scene, &shot.scene) {
-                let [first, pixels] =
-                    [strip.start, frame.dispatch.strip_rows].map(|rows| rows as usize * frame.view.width as usize);
-                textures.upload(&self.gpu, given, first..first + pixels);
+            plan.set_strip(&mut frame, strip);
+            if let Some(textures) = scene {
+                upload_scenes(textures, targets.temporal.as_mut(), &self.gpu, shot.scene, past.as_ref(), &frame);
             }
-            match (plan.integrator, rays) {
-                (Integrator::Reference, Some(rays)) => reference::run(&mut rec, &frame, rays, cloud_buffers)?,
-                (Integrator::Path, Some(rays)) => path::run(&mut rec, &frame, rays, cloud_buffers)?,
-                _ if frame.cloudless => rec.clear(&cloud_buffers.samples),
-                _ => march::record(&mut rec, &frame.at_samples(), &self.quality, ray_list, cloud_buffers),
+            let clouds = targets.clouds();
+            match (plan.integrator, &targets.rays, targets.reprojection(resized.as_ref())) {
+                _ if frame.cloudless => rec.clear(&clouds.samples),
+                (Integrator::Reference, Some(rays), _) => reference::run(&mut rec, &frame, rays, clouds)?,
+                (Integrator::Path, Some(rays), _) => path::run(&mut rec, &frame, rays, clouds)?,
+                (.., Some(buffers)) => {
+                    let previous = past.as_ref().map(|past| past.index);
+                    reproject::record(&mut rec, &frame, &self.quality, previous, &buffers);
+                }
+                _ => march::record(&mut rec, &frame.at_samples(), &self.quality, &targets.ray_list, clouds),
             }
-            let parts = Parts { cloud_buffers, background_corners, ray_list, out: output };
-            composite::record(&mut rec, &frame, &params, &parts, plan.by_cells);
-            download(&mut rec, &frame, targets, layers);
-            picture.append(&rec.flush()?, &frame, layers);
+            composite::record(&mut rec, &frame, &params, &targets.parts(), plan.by_cells);
+            match target {
+                Target::Animation(Some(screen)) => display::record(&mut rec, &frame, &targets.output, screen),
+                _ => download(&mut rec, &frame, targets, target.layers()),
+            }
+            picture.append(&rec.flush()?, &frame, target.layers());
         }
         self.gpu.pipelines.store();
+        if let Some(temporal) = &mut targets.temporal {
+            mem::swap(&mut temporal.before, &mut targets.now);
+            let (scene, index) =
+                (shot.scene.map(|scene| scene.distance.to_vec()), past.map_or(0, |past| past.index + 1));
+            self.past = Some(Past { camera: *shot.camera, params, time: shot.time, frame, scene, index });
+        }
         Ok(picture)
     }
 
-    /// The next frame of an animation by one light, onto a screen or, without one, to memory: a sixteenth of its pixels is
-    /// marched, the others follow the clouds from the frame before. The first frame, and the first after a cut, is a still.
+    /// Takes out the frame before, where the next one may be reprojected from it: if that fails, the one after is a still.
+    fn take_past(&mut self, shot: &Shot<'_>, target: Target<'_>, frame: &mut Frame) -> Option<Past> {
+        let Target::Still { first_sample, .. } = target else {
+            let cloudless = Integrator::March.is_cloudless(shot.params);
+            let past = self.past.take().filter(|past| past.serves(shot, cloudless, self.size));
+            frame.scene |= past.as_ref().is_some_and(|past| past.scene.is_some());
+            return past;
+        };
+        frame.view.first_sample = first_sample;
+        None
+    }
+
+    /// The next frame of an animation by one light: a sixteenth of its pixels is marched, the others are reprojected. The
+    /// first frame, and the first after a cut, is a still.
     pub(crate) fn next_frame(
         &mut self,
         shot: &Shot<'_>,
         screen: Option<&Screen>,
         interrupt: Interrupt<'_>,
     ) -> Result<Vec<f32>> {
-        let cut = self.last.as_ref().is_some_and(|last| last.is_cut(shot));
+        let cut = self.past.as_ref().is_some_and(|past| past.is_cut(shot));
         let params = &self.going.on(shot.params, shot.time, cut);
         let shot = &shot.of(params);
-        let integrator = Integrator::new(params, &self.quality);
-        if integrator != Integrator::March {
-            let image = self.accumulate(shot, interrupt)?;
-            screen.map_or(Ok(()), |screen| screen.write(&self.gpu, &image))?;
-            return Ok(image);
+        if Integrator::new(params, &self.quality) == Integrator::March {
+            self.check_pixels(shot)?;
+            return Ok(self.frame(shot, Target::Animation(screen), interrupt)?.image);
         }
-        let (mut frame, params) = shot.checked(self.size, &self.quality)?;
-        self.check_pixels(shot)?;
-        frame.ground_shadow = shot.background && frame.has_ground_shadow(shot.camera, &params);
-        // Taken out while the frame is in the making: if it fails, the next one starts anew.
-        let last = self.last.take().filter(|last| !last.is_cut(&shot.of(&params)));
-        let cloudless = integrator.is_cloudless(&params);
-        let last = last.filter(|last| {
-            let same_size = [last.frame.view.width, last.frame.view.height] == self.size;
-            last.frame.cloudless == cloudless && (last.is_bare(shot.scene.is_some()) || same_size)
-        });
-        frame.scene = shot.scene.is_some() || last.as_ref().is_some_and(|last| last.scene.is_some());
-        let plan = Plan::new(&mut frame, &params, &self.quality, true, false);
-        let last = last.filter(|last| last.is_bare(shot.scene.is_some()) || last.frame.grid == frame.grid);
-        let (targets, resized) = fit_temporal(&mut self.temporal, &self.gpu, &frame);
-        let resized = resized.filter(|_| last.is_some());
-        upload_scenes(&mut self.scene_depth, targets, &self.gpu, shot.scene, last.as_ref(), &frame);
-        frame.follow(shot, &params, last.as_ref(), resized.as_ref());
-        frame.dispatch.strip_rows = frame.view.height;
-
-        self.timings = Timings::default();
-        let mut rec = Recorder::new(&self.gpu, &mut self.timings, interrupt);
-        let inputs = plan.inputs(shot, &params, &self.quality, &frame);
-        self.luts.update(&mut rec, &inputs)?;
-        rec.bind(self.scene_depth.as_ref().map_or(Vec::new(), SceneTextures::bindings));
-        self.lut_memory = rec.held();
-
-        let TemporalTargets { ray_list, current, before, now, output, background_corners, scene_before, .. } =
-            &*targets;
-        if let Some(old) = &resized {
-            reproject::rescale(&mut rec, &frame, &old.before, before);
-        }
-        let index = last.as_ref().map_or(0, |last| last.index + 1);
-        let buffers = reproject::Buffers { ray_list, current, before, scene_before, now };
-        let follow = |rec: &mut Recorder<'_>| reproject::record(rec, &frame, &self.quality, index, &buffers);
-        if frame.cloudless {
-        } else if last.is_some() {
-            follow(&mut rec);
-        } else {
-            rec.compile_ahead(follow);
-            reproject::begin(&mut rec, &frame, &self.quality, ray_list, now);
-        }
-        let parts = Parts { cloud_buffers: &now.cloud_buffers, background_corners, ray_list, out: output };
-        composite::record(&mut rec, &frame, &params, &parts, plan.by_cells);
-        match screen {
-            Some(screen) => display::record(&mut rec, &frame, output, screen),
-            None => rec.download(&output.image, 0, 16 * count(self.size)),
-        }
-        let downloads = rec.submit()?;
-        let image = downloads.first().map_or(Vec::new(), |image| image.numbers().to_vec());
-
-        self.gpu.pipelines.store();
-        mem::swap(&mut targets.before, &mut targets.now);
-        let scene = shot.scene.map(|scene| scene.distance.to_vec());
-        self.last = Some(Past { camera: *shot.camera, params, time: shot.time, frame, scene, index });
+        let image = self.accumulate(shot, interrupt)?;
+        screen.map_or(Ok(()), |screen| screen.write(&self.gpu, &image))?;
         Ok(image)
     }
 
@@ -254,7 +221,7 @@ impl Renderer {
         // What has converged stays.
         if mean.count == 0 || shot.params.light.model == Model::Path {
             let first_sample = mean.count.wrapping_mul(self.quality.path_samples);
-            mean.add(self.still(shot, false, first_sample, interrupt)?.image);
+            mean.add(self.frame(shot, Target::Still { layers: false, first_sample }, interrupt)?.image);
         }
         let image = mean.image.clone();
         self.accumulator = Some(mean);
@@ -267,15 +234,16 @@ impl Renderer {
     /// where frames converge or are traced.
     pub fn history_length(&mut self) -> Result<Vec<u32>> {
         check_fork()?;
-        let followed = self.last.as_ref().is_some_and(|last| !last.frame.cloudless);
-        let Some(targets) = self.temporal.as_ref().filter(|targets| followed && targets.grid.size == self.size) else {
+        let followed = self.past.as_ref().is_some_and(|past| !past.frame.cloudless);
+        let Some(targets) = self.animation.as_ref().filter(|targets| followed && targets.grid.size == self.size) else {
             return Ok(Vec::new());
         };
+        let Some(temporal) = &targets.temporal else { return Ok(Vec::new()) };
         let [width, height] = targets.grid.size;
         let [columns, rows] = targets.grid.samples();
         let mut timings = Timings::default();
         let mut rec = Recorder::new(&self.gpu, &mut timings, &|| Ok(()));
-        rec.download(&targets.before.length, 0, 4 * count([columns, rows]));
+        rec.download(&temporal.before.length, 0, 4 * count([columns, rows]));
         let lengths = rec.submit()?;
         let lengths: &[u32] = lengths[0].numbers();
         let spacing = targets.grid.spacing();
@@ -293,6 +261,6 @@ impl Renderer {
     pub(crate) fn forget(&mut self) {
         self.accumulator = None;
         self.going = Going::default();
-        self.last = None;
+        self.past = None;
     }
 }

@@ -1,4 +1,4 @@
-//! The user's scene: how far each pixel's ray goes until it meets it, and its radiance there.
+//! User-supplied scene: the distance along each pixel's ray and the radiance there.
 
 use std::ops::Range;
 
@@ -7,32 +7,33 @@ use crate::gpu::Gpu;
 use crate::gpu::{Binding, Bindings};
 use crate::shared::constants;
 
-/// Farthest distance of a scene, m: what is beyond it counts as sky, as infinity does. Five times the diameter of the
-/// largest planet. Rasterizers call the sky 1e10 and more, or the largest f32.
+/// Maximum distance of a scene in m, five times the diameter of the largest planet. Farther pixels, infinity included,
+/// are sky. Rasterizers give the sky distances of 1e10 and more, or the largest f32.
 pub const FARTHEST: f32 = 1e10;
 
 constants! {
-    /// Distance of a scene that is not there, m: beyond all others.
+    /// Distance in m of pixels without a scene, beyond all others.
     const NO_SCENE: f32 = 1e30;
-    /// Texels of a row of the scene's textures: pictures are wider than textures may be.
+    /// Texels per row of the scene textures: pictures may be wider than the texture limit.
     const SCENE_ROW: u32 = 2048;
 }
 
-/// A scene among the clouds, pixel by pixel.
+/// Scene among the clouds, by pixel.
 #[derive(Clone, Copy, Debug)]
 pub struct SceneDepth<'a> {
-    /// Metres along the ray of each pixel; beyond [`FARTHEST`], infinity among it, there is nothing.
+    /// Distance along the ray of each pixel in m; beyond [`FARTHEST`] there is no scene.
     pub distance: &'a [f32],
-    /// Radiance, red, green and blue of each pixel; without it the picture leaves room for it.
+    /// Radiance of each pixel, red, green and blue. Without it the picture is composited for a later blend with the
+    /// scene.
     pub color: Option<&'a [f32]>,
 }
 
 impl SceneDepth<'_> {
-    /// Whether it fits a picture.
+    /// Checks the lengths and the values for a picture of `width` x `height` pixels.
     pub(crate) fn check(&self, [width, height]: [u32; 2]) -> Result<()> {
         let pixels = width as usize * height as usize;
         let fits = |name: &str, numbers: &[f32], channels: usize| {
-            // Written so that NaN fails it.
+            // The comparison rejects NaN.
             let good = numbers.len() == channels * pixels && numbers.iter().all(|v| *v >= 0.0);
             let allowed = format!("{channels} numbers from 0 for each of {width} x {height} pixels");
             if good { Ok(()) } else { Err(Error::parameter(name, "an array", allowed)) }
@@ -42,7 +43,7 @@ impl SceneDepth<'_> {
     }
 }
 
-/// A sheet of it on the GPU.
+/// Textures with the scene of a strip.
 pub(crate) struct SceneTextures {
     depth: wgpu::Texture,
     color: wgpu::Texture,
@@ -50,24 +51,25 @@ pub(crate) struct SceneTextures {
 }
 
 impl SceneTextures {
-    /// Textures for a user's scene of so many pixels, none where there is none.
+    /// Textures for a scene of `pixels` pixels, reused if they suffice; None without a scene.
     pub fn fit<'a>(
-        kept: &'a mut Option<Self>,
+        textures: &'a mut Option<Self>,
         gpu: &Gpu,
         scene: Option<SceneDepth<'_>>,
         pixels: u32,
     ) -> Option<&'a Self> {
         let colored = scene?.color.is_some();
-        if !kept.as_ref().is_some_and(|old| old.holds(pixels.into(), colored)) {
-            *kept = Some(Self::new(gpu, pixels.into(), colored));
+        if !textures.as_ref().is_some_and(|old| old.holds(pixels.into(), colored)) {
+            *textures = Some(Self::new(gpu, pixels.into(), colored));
         }
-        kept.as_ref()
+        textures.as_ref()
     }
 
-    /// Most pixels of a sheet: textures have at least so many rows.
+    /// Maximum number of pixels of a strip: every adapter supports 8192 texture rows.
     pub const MOST_PIXELS: u64 = 8192 * SCENE_ROW as u64;
 
-    /// For sheets of so many pixels; of none where there is no scene, as kernels that ask for none want something bound.
+    /// Textures for strips of `pixels` pixels. Without a scene they have one texel: kernels that name them need a
+    /// binding.
     pub fn new(gpu: &Gpu, pixels: u64, colored: bool) -> Self {
         let texture = |label, pixels: u64, format| {
             let width = if pixels > 0 { SCENE_ROW } else { 1 };
@@ -79,13 +81,13 @@ impl SceneTextures {
         Self { depth, color, views }
     }
 
-    /// Whether it has room for sheets of so many pixels.
+    /// Whether strips of `pixels` pixels fit.
     pub fn holds(&self, pixels: u64, colored: bool) -> bool {
         let room = |texture: &wgpu::Texture| u64::from(texture.width()) * u64::from(texture.height());
         (pixels == 0 || room(&self.depth) >= pixels) && (!colored || room(&self.color) >= pixels)
     }
 
-    /// Uploads some of its pixels.
+    /// Uploads a range of pixels. The remaining texels have no scene.
     pub fn upload(&self, gpu: &Gpu, scene: &SceneDepth<'_>, pixels: Range<usize>) {
         let texels = |texture: &wgpu::Texture| texture.width() as usize * texture.height() as usize;
         let mut distance: Vec<f32> =

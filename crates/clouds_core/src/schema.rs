@@ -1,32 +1,33 @@
-//! How a parameter describes itself: one declaration gives the Rust struct, the bytes and the text of the WGSL
-//! uniform, the Python dataclass, the manual, and the range check.
+//! Declarations of parameters. One declaration yields the Rust struct, the layout and text of the WGSL uniform, the
+//! Python dataclass, the manual, and the range check.
 
 use std::fmt::{self, Write as _};
 use std::sync::Arc;
 
 use crate::error::{Error, Result};
 
-/// What kind of value a parameter holds.
+/// Type of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Type {
-    /// A number.
+    /// Number.
     F32,
-    /// A whole number from 0.
+    /// Non-negative integer.
     U32,
-    /// A switch; `u32` 0 or 1 in WGSL, where `bool` cannot be shared with the host.
+    /// Switch; in WGSL a `u32` of 0 or 1, as `bool` is not host-shareable.
     Bool,
-    /// Two, three or four numbers.
+    /// Vector of two, three or four numbers.
     Vector(usize),
-    /// One or two numbers in f64, too exact for a uniform: the GPU knows what follows from them, by `frame`.
+    /// One or two numbers in f64, whose precision a uniform does not hold. The GPU receives values derived from them,
+    /// in `frame`.
     Exact(usize),
-    /// One of a few words; its index is a `u32` in WGSL.
+    /// One of a set of words; in WGSL a `u32`, the index of the word.
     Choice(&'static [&'static str]),
-    /// Nothing, or an image of so many channels: it reaches the GPU as a texture and not in the uniform.
+    /// Optional image of a number of channels. The GPU receives it as a texture, not in the uniform.
     Map(usize),
 }
 
 impl Type {
-    /// Size in 32-bit words of the WGSL uniform.
+    /// Size in the WGSL uniform, in 32-bit words.
     pub const fn words(self) -> usize {
         match self {
             Self::F32 | Self::U32 | Self::Bool | Self::Choice(_) => 1,
@@ -44,7 +45,7 @@ impl Type {
         }
     }
 
-    /// Its name in WGSL.
+    /// Name of the type in WGSL.
     pub fn wgsl(self) -> String {
         match self {
             Self::F32 => "f32".into(),
@@ -55,16 +56,16 @@ impl Type {
     }
 }
 
-/// An image of `height` rows of `width` pixels, row by row.
+/// Image, row by row.
 #[derive(Clone, PartialEq)]
 pub struct Map {
-    /// Pixels in a row.
+    /// Pixels per row.
     pub width: usize,
-    /// Rows.
+    /// Number of rows.
     pub height: usize,
-    /// Numbers of a pixel.
+    /// Values per pixel.
     pub channels: usize,
-    /// `width * height * channels` numbers.
+    /// `width * height * channels` values.
     pub data: Vec<f32>,
 }
 
@@ -74,20 +75,20 @@ impl fmt::Debug for Map {
     }
 }
 
-/// A value on its way in or out of a block, before it has the type of its field.
+/// Value of a parameter, before conversion to the type of its field or after conversion from it.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
-    /// A switch.
+    /// Switch.
     Bool(bool),
-    /// A whole number.
+    /// Integer.
     Int(i64),
-    /// A number.
+    /// Number.
     Float(f64),
-    /// Several numbers.
+    /// Vector.
     Vector(Vec<f64>),
-    /// A word.
+    /// Word.
     Text(String),
-    /// An image.
+    /// Image.
     Map(Arc<Map>),
     /// No image.
     None,
@@ -110,25 +111,25 @@ impl fmt::Display for Value {
     }
 }
 
-/// What the rest of the world needs to know about one parameter.
+/// Description of a parameter.
 #[derive(Clone, Copy, Debug)]
 pub struct Field {
-    /// Its name, the same in Rust, WGSL and Python.
+    /// Name, the same in Rust, WGSL and Python.
     pub name: &'static str,
-    /// One or more sentences.
+    /// Documentation, one or more sentences.
     pub doc: &'static str,
-    /// Unit, or nothing.
+    /// Unit; empty if there is none.
     pub unit: &'static str,
-    /// Smallest and largest allowed value (of each component).
+    /// Smallest and largest allowed value, of each component.
     pub range: (f64, f64),
-    /// Its type.
+    /// Type.
     pub ty: Type,
-    /// Where it starts in the WGSL struct of its block, in bytes.
+    /// Offset in the WGSL struct of its block, in bytes.
     pub offset: usize,
 }
 
 impl Field {
-    /// What is allowed, in words.
+    /// Description of the allowed values, for error messages and the manual.
     pub fn allowed(&self) -> String {
         let (min, max) = self.range;
         let unit = if self.unit.is_empty() { String::new() } else { format!(" {}", self.unit) };
@@ -145,10 +146,12 @@ impl Field {
         }
     }
 
-    /// The value in the type of this field, or an error that names the field, the value and what is allowed.
+    /// Converts a value to the type of this field.
+    ///
+    /// Returns [`Error::Parameter`] with the field, the value and the allowed values if it does not fit.
     pub fn check(&self, block: &str, value: &Value) -> Result<Value> {
         let (min, max) = self.range;
-        // Written so that NaN fails it.
+        // Comparisons that reject NaN.
         let in_range = |v: f64| v >= min && v <= max;
         let number = |v: &Value| match v {
             Value::Int(v) => Some(*v as f64),
@@ -181,15 +184,15 @@ impl Field {
     }
 }
 
-/// A Rust type that a parameter can have.
+/// Rust type of a parameter.
 pub trait Typed: Sized {
-    /// What to call it.
+    /// Corresponding [`Type`].
     const TYPE: Type;
-    /// From a value that [`Field::check`] has accepted.
+    /// Conversion from a value that [`Field::check`] has accepted.
     fn from_value(value: &Value) -> Option<Self>;
-    /// As a value.
+    /// Conversion to a value.
     fn to_value(&self) -> Value;
-    /// As words of the uniform; `out` has [`Type::words`] of them.
+    /// Writes the words of the uniform; `out` has [`Type::words`] of them.
     fn write(&self, out: &mut [u32]);
 }
 
@@ -203,7 +206,7 @@ impl Typed for f32 {
         }
     }
     fn to_value(&self) -> Value {
-        // Through text, so that 0.45 stays 0.45 and does not become 0.44999998807907104.
+        // Through decimal text, so that 0.45 stays 0.45 instead of 0.44999998807907104.
         Value::Float(self.to_string().parse().expect("a number prints as a number"))
     }
     fn write(&self, out: &mut [u32]) {
@@ -291,7 +294,7 @@ impl<const N: usize> Typed for [f32; N] {
     }
 }
 
-/// An image of one channel.
+/// Image of one channel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table(pub Arc<Map>);
 
@@ -321,23 +324,23 @@ impl Typed for Option<Arc<Map>> {
     fn write(&self, _out: &mut [u32]) {}
 }
 
-/// A block of parameters: a struct in Rust and WGSL, a dataclass in Python.
+/// Block of parameters: a struct in Rust and WGSL, a dataclass in Python.
 pub trait Block {
-    /// Its type's name.
+    /// Name of its type.
     fn type_name(&self) -> &'static str;
-    /// What it holds.
+    /// Documentation.
     fn doc(&self) -> &'static str;
-    /// Its parameters, in order.
+    /// Its parameters, in order of declaration.
     fn fields(&self) -> &'static [Field];
-    /// The value of one.
+    /// Value of a parameter, by its index in `fields`.
     fn get(&self, index: usize) -> Value;
-    /// Sets one from a value that [`Field::check`] has accepted.
+    /// Sets a parameter from a value that [`Field::check`] has accepted; None for any other value.
     fn set(&mut self, index: usize, value: &Value) -> Option<()>;
-    /// Writes the bytes of the WGSL struct; `out` has [`size`] of them, as words.
+    /// Writes the words of the WGSL struct; `out` has [`size`] / 4 of them.
     fn write(&self, out: &mut [u32]);
 }
 
-/// Size in bytes of the WGSL struct of a block, rounded up so that the next block can follow it in a uniform.
+/// Size of the WGSL struct of a block in bytes, rounded up to the alignment of a following block.
 pub const fn size(fields: &[Field]) -> usize {
     let (mut end, mut i) = (0, 0);
     while i < fields.len() {
@@ -347,7 +350,7 @@ pub const fn size(fields: &[Field]) -> usize {
     end.next_multiple_of(16)
 }
 
-/// Lays fields out by WGSL's rule: each starts at the next multiple of its alignment.
+/// Assigns offsets by the layout rules of WGSL: the next multiple of each field's alignment.
 pub const fn layout<const N: usize>(mut fields: [Field; N]) -> [Field; N] {
     let (mut end, mut i) = (0usize, 0);
     while i < N {
@@ -358,7 +361,7 @@ pub const fn layout<const N: usize>(mut fields: [Field; N]) -> [Field; N] {
     fields
 }
 
-/// A field's name without the `r#` that lets Rust call a field `type`.
+/// Name of a field without the `r#` of Rust's raw identifiers.
 pub const fn bare(name: &'static str) -> &'static str {
     match name.as_bytes() {
         [b'r', b'#', ..] => name.split_at(2).1,
@@ -366,7 +369,9 @@ pub const fn bare(name: &'static str) -> &'static str {
     }
 }
 
-/// Sets the parameter `name` of `block` (called `path` in errors) after checking it.
+/// Checks a value and assigns it to the parameter `name` of `block`. Errors call the block `path`.
+///
+/// Returns [`Error::Parameter`] for an unknown name or a value that does not fit.
 pub fn assign(block: &mut dyn Block, path: &str, name: &str, value: &Value) -> Result<()> {
     let fields = block.fields();
     let Some(index) = fields.iter().position(|field| field.name == name) else {
@@ -378,12 +383,12 @@ pub fn assign(block: &mut dyn Block, path: &str, name: &str, value: &Value) -> R
     block.set(index, &value).ok_or_else(|| Error::parameter(&format!("{path}.{name}"), &value, field.allowed()))
 }
 
-/// A field's name in WGSL, where `type` is reserved.
+/// Name of a field in WGSL, where `type` is reserved.
 pub fn wgsl_name(name: &str) -> &str {
     if name == "type" { "type_" } else { name }
 }
 
-/// The WGSL struct of a block, nothing where it would be empty.
+/// WGSL struct of a block and the constants of its choices; empty if the block has no words in the uniform.
 pub fn wgsl_struct(block: &dyn Block) -> String {
     if size(block.fields()) == 0 {
         return String::new();
@@ -405,7 +410,7 @@ pub fn wgsl_struct(block: &dyn Block) -> String {
     code
 }
 
-/// Declares a block of parameters. The range may be left out where no user sets the value.
+/// Declares a block of parameters. The range is optional, for values that no user sets.
 #[macro_export]
 macro_rules! params {
     ($($(#[doc = $doc:literal])* $block:ident { $(
@@ -421,7 +426,7 @@ macro_rules! params {
         }
 
         impl $block {
-            /// Its parameters, in order.
+            /// Its parameters, in order of declaration.
             pub const FIELDS: &'static [$crate::schema::Field] = &$crate::schema::layout([$(
                 $crate::schema::Field {
                     name: $crate::schema::bare(stringify!($field)),
@@ -463,7 +468,7 @@ macro_rules! params {
     )* };
 }
 
-/// The words of a uniform block of several parts.
+/// Words of a uniform block of several parts.
 pub(crate) fn words(parts: &[&dyn Block]) -> Vec<u32> {
     let mut words = Vec::new();
     for part in parts {
@@ -474,7 +479,7 @@ pub(crate) fn words(parts: &[&dyn Block]) -> Vec<u32> {
     words
 }
 
-/// Declares a parameter type that is one of a few words.
+/// Declares a parameter type with a set of words.
 #[macro_export]
 macro_rules! choice {
     ($(#[doc = $doc:literal])* $name:ident { $( $(#[doc = $about:literal])* $variant:ident = $word:literal, )* }) => {

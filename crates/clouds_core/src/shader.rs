@@ -1,4 +1,4 @@
-//! The shaders of the crate: WGSL files, and modules that are written from what Rust declares, so that they cannot be stale.
+//! Shaders of the crate: WGSL files, and modules generated from Rust declarations, which keeps both languages in step.
 
 use std::fmt::Write as _;
 use std::sync::Arc;
@@ -14,13 +14,17 @@ use crate::{blue_noise, camera, color, frame, gpu, grid, moon, scene_depth};
 pub use crate::gpu::{Linked, names};
 
 impl Gpu {
-    /// The device of the adapter that `wanted` means, opened on first use; with none, the best.
+    /// Device of an adapter, opened on first use. `wanted` is an index, a kind, or a part of its name, driver or PCI
+    /// address; None selects the best adapter.
+    ///
+    /// Returns [`Error::Adapter`] if no adapter matches, and [`Error::Fork`] in a forked child.
     pub fn open(wanted: Option<&str>) -> Result<Arc<Self>> {
         Self::open_with(wanted, generated)
     }
 
-    /// Forgets what has been compiled, so that the shaders are read anew (`NUBIS_SHADERS`). Where one is broken all stays as it
-    /// is, and the error names its file and line.
+    /// Drops all compiled kernels, so that the shaders are read again (`NUBIS_SHADERS`).
+    ///
+    /// Returns [`Error::File`] with file and line of an invalid shader, and keeps the compiled kernels.
     pub fn reload_shaders(&self) -> Result<()> {
         for name in names() {
             link(name).and_then(|linked| linked.parse().map(drop)).map_err(Error::File)?;
@@ -30,22 +34,22 @@ impl Gpu {
     }
 }
 
-/// The text of a WGSL file or of a generated module.
+/// Source of a WGSL file or of a generated module.
 pub fn read(name: &str) -> Option<String> {
     gpu::read(name, generated)
 }
 
-/// Links a WGSL file with all that it imports.
+/// Links a WGSL file with all of its imports.
 pub fn link(name: &str) -> std::result::Result<Linked, String> {
     Linked::new(name, generated)
 }
 
-/// Links WGSL that is no file with all that it imports.
+/// Links WGSL source with all of its imports.
 pub fn link_source(source: &str) -> std::result::Result<Linked, String> {
     Linked::from_source(source, generated)
 }
 
-/// The modules that are no files.
+/// Source of a generated module.
 fn generated(name: &str) -> Option<String> {
     match name {
         "params" => Some(params_source()),
@@ -73,7 +77,7 @@ fn params_source() -> String {
     code
 }
 
-/// The WGSL module `constants`. A module that is missing here breaks the shaders that read its constants.
+/// WGSL module `constants`. Shaders that read a constant of a module that is not listed here do not compile.
 fn constants_source() -> String {
     let modules = [
         blue_noise::constants,

@@ -1,12 +1,12 @@
-//! Constants that Rust and WGSL share. Each is declared once, in the module that owns its meaning, and written into the
+//! Constants shared by Rust and WGSL. Each is declared once, in the module that owns its meaning, and written to the
 //! WGSL module `constants` when shaders are linked.
 
-/// Declares constants of a module for Rust, and for WGSL by the same names. Their documentation has unit and source.
+/// Declares constants of a module for Rust and, by the same names, for WGSL. Their documentation gives unit and source.
 macro_rules! constants {
     ($($(#[doc = $doc:literal])+ $vis:vis const $name:ident: $ty:ty = $value:expr;)+) => {
         $($(#[doc = $doc])+ $vis const $name: $ty = $value;)+
 
-        /// The constants of this module in WGSL.
+        /// Declarations of the constants of this module in WGSL.
         pub(crate) fn constants() -> String {
             [$($crate::shared::declaration(stringify!($name), concat!($($doc),+), &$name)),+].concat()
         }
@@ -14,16 +14,16 @@ macro_rules! constants {
 }
 pub(crate) use constants;
 
-/// A constant in WGSL.
+/// Declaration of a constant in WGSL.
 pub(crate) fn declaration(name: &str, doc: &str, value: &impl Shared) -> String {
     format!("const {name}: {} = {}; //{doc}\n", value.wgsl_type(), value.wgsl())
 }
 
-/// A type that constants of both languages have.
+/// Type of a shared constant.
 pub(crate) trait Shared {
-    /// The type in WGSL.
+    /// Type in WGSL.
     fn wgsl_type(&self) -> String;
-    /// The value in WGSL.
+    /// Literal in WGSL.
     fn wgsl(&self) -> String;
 }
 
@@ -32,12 +32,12 @@ impl Shared for f32 {
         "f32".into()
     }
     fn wgsl(&self) -> String {
-        // The fewest digits that are read back as the same bits.
+        // Shortest decimal text that parses to the same bits.
         format!("{self:?}")
     }
 }
 
-/// What Rust works out in f64 is rounded for WGSL, as naga rounds a number without a type.
+/// Values in f64 are rounded to f32, as naga rounds literals without a type.
 impl Shared for f64 {
     fn wgsl_type(&self) -> String {
         "f32".into()
@@ -47,7 +47,7 @@ impl Shared for f64 {
     }
 }
 
-/// Whole numbers, whatever Rust counts with them.
+/// Integers of any width are `u32` in WGSL.
 macro_rules! whole {
     ($($ty:ty),+) => { $(
         impl Shared for $ty {
@@ -77,7 +77,7 @@ macro_rules! vectors {
 }
 vectors!(f32, f64);
 
-/// A matrix by rows; WGSL has its columns.
+/// Matrix by rows; WGSL matrices are by columns.
 impl Shared for [[f32; 3]; 3] {
     fn wgsl_type(&self) -> String {
         "mat3x3f".into()

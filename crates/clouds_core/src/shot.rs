@@ -28,6 +28,11 @@ impl<'a> Shot<'a> {
         Self { camera, params, time, background: true, scene: None }
     }
 
+    /// The scene of the user, or an empty one.
+    pub(crate) fn scene_or_none(&self) -> SceneDepth<'a> {
+        self.scene.unwrap_or(SceneDepth { distance: &[], color: None })
+    }
+
     /// The same of another sky.
     pub(crate) fn of<'b>(&self, params: &'b Params) -> Shot<'b>
     where

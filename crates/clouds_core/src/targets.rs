@@ -1,114 +1,114 @@
-//! What a picture is made in: buffers kept from one to the next.
+//! Buffers that a picture is rendered into. They are kept from one picture to the next.
 
 use crate::frame::Frame;
 use crate::gpu::Bindings;
 use crate::gpu::Gpu;
 use crate::grid::SampleGrid;
 use crate::passes::clouds::CloudBuffers;
-use crate::passes::composite::{Background, Output};
+use crate::passes::composite::{Background, Output, Parts};
 use crate::passes::rays::Rays;
 use crate::passes::refine::RayList;
-use crate::passes::reproject::{Current, HistoryBuffers};
+use crate::passes::reproject::{self, Current, HistoryBuffers};
 use crate::passes::{path, reference};
-use crate::plan::Integrator;
+use crate::plan::{Integrator, Plan};
 use crate::scene_depth::SceneTextures;
 
-/// Buffers of the strips of a still.
-pub(crate) struct StillTargets {
-    grid: SampleGrid,
+/// Buffers of the strips of a still, or of the frames of an animation.
+pub(crate) struct Targets {
+    pub grid: SampleGrid,
     integrator: Integrator,
     pub ray_list: RayList,
-    pub cloud_buffers: CloudBuffers,
+    /// Clouds of the picture; in an animation with their history lengths.
+    pub now: HistoryBuffers,
+    pub background: Background,
     pub output: Output,
-    pub background_corners: Background,
+    /// State of the rays that converge or are traced.
     pub rays: Option<Rays>,
+    pub temporal: Option<Temporal>,
 }
 
-impl StillTargets {
-    fn new(gpu: &Gpu, grid: SampleGrid, integrator: Integrator) -> Self {
-        let [pixels, samples] = [grid.size, grid.samples()].map(count);
+/// What an animation keeps from frame to frame.
+pub(crate) struct Temporal {
+    pub current: Current,
+    /// Clouds of the previous frame.
+    pub before: HistoryBuffers,
+    /// Scene of the user in the previous frame.
+    pub scene_before: SceneTextures,
+}
+
+impl Targets {
+    fn new(gpu: &Gpu, grid: SampleGrid, integrator: Integrator, animated: bool) -> Self {
+        let [pixels, samples, cells] = [grid.size, grid.samples(), grid.cells()].map(count);
         let ray_bytes = match integrator {
             Integrator::March => None,
             Integrator::Reference => Some(reference::RAY_BYTES),
             Integrator::Path => Some(path::RAY_BYTES),
         };
+        let temporal = || Temporal {
+            current: Current::new(gpu, cells),
+            before: HistoryBuffers::new(gpu, samples, samples),
+            scene_before: SceneTextures::new(gpu, 0, false),
+        };
         Self {
             grid,
             integrator,
             ray_list: RayList::new(gpu, samples),
-            cloud_buffers: CloudBuffers::new(gpu, samples),
+            now: HistoryBuffers::new(gpu, samples, if animated { samples } else { 0 }),
+            background: Background::new(gpu, grid.size),
             output: Output::new(gpu, pixels),
-            background_corners: Background::new(gpu, grid.size),
             rays: ray_bytes.map(|bytes| Rays::new(gpu, pixels, bytes)),
+            temporal: animated.then(temporal),
         }
     }
 
-    /// Those of a strip: the same as before where it has room in them.
-    pub fn fit<'a>(kept: &'a mut Option<Self>, gpu: &Gpu, frame: &Frame, integrator: Integrator) -> &'a Self {
-        let grid = frame.grid.strip(frame.dispatch.strip_rows);
-        let fits = |old: &Self| {
-            let same = old.grid.strip(0) == grid.strip(0) && old.integrator == integrator;
-            same && old.grid.size[1] >= grid.size[1]
+    /// Buffers for the strips of a plan, the kept ones where they serve. Of an animation whose sample grid has changed the
+    /// second are those of the previous frame.
+    pub fn fit<'a>(
+        kept: &'a mut Option<Self>,
+        gpu: &Gpu,
+        frame: &Frame,
+        plan: &Plan,
+        animated: bool,
+    ) -> (&'a mut Self, Option<Self>) {
+        let grid = frame.grid.strip(plan.most_rows());
+        let serve = |old: &Self| {
+            let alike = old.grid.strip(0) == grid.strip(0) && old.integrator == plan.integrator;
+            alike && if animated { old.grid == grid } else { old.grid.size[1] >= grid.size[1] }
         };
-        if !kept.as_ref().is_some_and(fits) {
-            *kept = None;
-        }
-        kept.get_or_insert_with(|| Self::new(gpu, grid, integrator))
+        let old = kept.take_if(|old| !serve(old)).filter(|_| animated);
+        (kept.get_or_insert_with(|| Self::new(gpu, grid, plan.integrator, animated)), old)
     }
 
-    /// What is kept on the device.
+    /// Clouds of the picture.
+    pub fn clouds(&self) -> &CloudBuffers {
+        &self.now.cloud_buffers
+    }
+
+    /// What the composite reads and writes.
+    pub fn parts(&self) -> Parts<'_> {
+        let Self { now, background, ray_list, output, .. } = self;
+        Parts { cloud_buffers: &now.cloud_buffers, background_corners: background, ray_list, out: output }
+    }
+
+    /// What reprojection reads and writes, in an animation.
+    pub fn reprojection<'a>(&'a self, resized: Option<&'a Self>) -> Option<reproject::Buffers<'a>> {
+        let Self { ray_list, now, temporal, .. } = self;
+        let Temporal { current, before, scene_before } = temporal.as_ref()?;
+        let resized = resized.and_then(|old| old.temporal.as_ref()).map(|old| &old.before);
+        Some(reproject::Buffers { ray_list, current, before, resized, scene_before, now })
+    }
+
+    /// Buffers on the device by name.
     pub fn bindings(&self) -> Bindings {
-        let rays = self.rays.as_ref().map_or(Vec::new(), |rays| rays.bindings("rays"));
-        let Self { cloud_buffers, ray_list, output, background_corners, .. } = self;
-        [cloud_buffers.bindings(), ray_list.bindings(), output.bindings(), background_corners.bindings(), rays].concat()
-    }
-}
-
-/// Buffers of whole pictures, and what the frame before has left in them.
-pub(crate) struct TemporalTargets {
-    pub grid: SampleGrid,
-    pub ray_list: RayList,
-    pub current: Current,
-    pub before: HistoryBuffers,
-    pub now: HistoryBuffers,
-    pub output: Output,
-    pub background_corners: Background,
-    /// The user's scene in the frame before.
-    pub scene_before: SceneTextures,
-}
-
-impl TemporalTargets {
-    pub fn new(gpu: &Gpu, grid: SampleGrid) -> Self {
-        let [samples, cells] = [grid.samples(), grid.cells()].map(count);
-        Self {
-            grid,
-            ray_list: RayList::new(gpu, samples),
-            current: Current::new(gpu, cells),
-            before: HistoryBuffers::new(gpu, samples),
-            now: HistoryBuffers::new(gpu, samples),
-            output: Output::new(gpu, count(grid.size)),
-            background_corners: Background::new(gpu, grid.size),
-            scene_before: SceneTextures::new(gpu, 0, false),
-        }
-    }
-
-    /// What is kept on the device.
-    pub fn bindings(&self) -> Bindings {
-        let Self { ray_list, current, before, now, output, background_corners, scene_before, .. } = self;
+        let Self { ray_list, now, background, output, rays, temporal, .. } = self;
+        let rays = rays.as_ref().map_or(Vec::new(), |rays| rays.bindings("rays"));
+        let shared = [ray_list.bindings(), output.bindings(), background.bindings(), rays].concat();
+        let Some(Temporal { current, before, scene_before }) = temporal else {
+            return [now.cloud_buffers.bindings(), shared].concat();
+        };
         let scene = vec![("scene_before", scene_before.depth())];
-        let ours = [current.bindings(), ray_list.bindings(), output.bindings(), background_corners.bindings(), scene];
-        [ours.concat(), before.bindings(), now.bindings()].concat()
+        [current.bindings(), shared, scene, before.bindings(), now.bindings()].concat()
     }
-}
-
-/// Buffers for a frame, and those of the frame before where it had another size or was known at other pixels.
-pub(crate) fn fit_temporal<'a>(
-    kept: &'a mut Option<TemporalTargets>,
-    gpu: &Gpu,
-    frame: &Frame,
-) -> (&'a mut TemporalTargets, Option<TemporalTargets>) {
-    let old = kept.take_if(|old| old.grid != frame.grid);
-    (kept.get_or_insert_with(|| TemporalTargets::new(gpu, frame.grid)), old)
 }
 
 pub(crate) fn count(size: [u32; 2]) -> u64 {

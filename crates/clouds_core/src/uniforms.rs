@@ -1,55 +1,55 @@
-//! The uniform blocks that follow from a picture, by how long they hold: `frame` with its parts `view` and `sky`, and `dispatch`.
-//! The third, `params`, is what the user sets.
+//! Uniform blocks derived from a picture, by lifetime: `frame` with its parts `view` and `sky`, and `dispatch`. The
+//! third block, `params`, holds what the user sets.
 
 use crate::gpu::{Binding, Gpu};
 use crate::schema::{self, Block};
 
 crate::params! {
-    /// Eye, camera and planet, and where they were in the frame before. Worked out in f64 (frame.rs).
+    /// Camera, eye and planet in this frame and the previous one. Computed in f64 (frame.rs).
     View {
-        /// Width of the picture in pixels.
+        /// Width of the picture, pixels.
         width: u32 = 1;
-        /// Height of the picture in pixels.
+        /// Height of the picture, pixels.
         height: u32 = 1;
-        /// 1 to put the clouds before the sky, 0 to return them alone.
+        /// 1 to composite the clouds over the background, 0 to return the clouds alone.
         background: u32 = 1;
-        /// 1 where eye, view, clouds or the user's scene have moved since the frame before.
+        /// 1 if eye, view, clouds or the user's scene have moved since the previous frame.
         moving: u32 = 0;
-        /// Most rays through a pixel that is wider than clouds (subrays.wgsl).
+        /// Maximum number of rays through a pixel that is wider than clouds (subrays.wgsl).
         most_rays: f32 = 1.0;
-        /// Number of the first path of each pixel (passes/path).
+        /// Index of the first path of each pixel (passes/path).
         first_sample: u32 = 0;
         /// Tangent of half the vertical field of view.
         tan_half_fov: f32 = 1.0;
-        /// Half the field of view of a fisheye in radians.
+        /// Half the field of view of a fisheye, radians.
         half_fov: f32 = 1.0;
-        /// Camera axis.
+        /// Camera axis, right.
         right: [f32; 3] = [1.0, 0.0, 0.0];
-        /// Camera axis.
+        /// Camera axis, up.
         up: [f32; 3] = [0.0, 0.0, 1.0];
-        /// Camera axis.
+        /// Camera axis, forward.
         forward: [f32; 3] = [0.0, 1.0, 0.0];
-        /// The same of the frame before.
+        /// Right axis of the previous frame's camera.
         previous_right: [f32; 3] = [1.0, 0.0, 0.0];
-        /// The same of the frame before.
+        /// Up axis of the previous frame's camera.
         previous_up: [f32; 3] = [0.0, 0.0, 1.0];
-        /// The same of the frame before.
+        /// Forward axis of the previous frame's camera.
         previous_forward: [f32; 3] = [0.0, 1.0, 0.0];
-        /// The same of the frame before.
+        /// Tangent of half the vertical field of view of the previous frame.
         previous_tan_half_fov: f32 = 1.0;
-        /// The same of the frame before.
+        /// Half the field of view of a fisheye in the previous frame, radians.
         previous_half_fov: f32 = 1.0;
-        /// Width of the frame before, where it had another size.
+        /// Width of the previous frame, pixels; it may differ.
         previous_width: u32 = 1;
-        /// Its height.
+        /// Height of the previous frame, pixels.
         previous_height: u32 = 1;
-        /// Pixels from one that its clouds were known at to the next.
+        /// Sample spacing of the previous frame, pixels.
         previous_spacing: u32 = 1;
-        /// Frames in which each of those was marched once.
+        /// Number of frames in which each sample of the previous frame was marched once.
         previous_cycle: u32 = 1;
-        /// How far the eye has moved since the frame before, m.
+        /// Displacement of the eye since the previous frame, m.
         eye_motion: [f32; 3] = [0.0, 0.0, 0.0];
-        /// How far the wind has carried the clouds since the frame before, m.
+        /// Displacement of the clouds by the wind since the previous frame, m.
         cloud_motion: [f32; 3] = [0.0, 0.0, 0.0];
         /// Distance at which pixels without clouds are reprojected, m.
         far_distance: f32 = 100000.0;
@@ -59,195 +59,198 @@ crate::params! {
         altitude: f32 = 0.0;
         /// Distance of the eye from the planet's centre, m.
         centre_distance: f32 = 6371000.0;
-        /// Angle of the horizon below the horizontal at the eye, radians.
+        /// Depression of the horizon below the horizontal at the eye, radians.
         horizon_dip: f32 = 0.0;
-        /// Power of the eye's point for the ground: (h - H)(2R + h + H) for a sphere at altitude H, m^2.
+        /// Power of the eye with respect to the sphere of the ground: (h - H)(2R + h + H) for a sphere at altitude H,
+        /// m^2.
         power_ground: f32 = 0.0;
-        /// The same for the lowest clouds.
+        /// Power of the eye with respect to the sphere of the lowest clouds, m^2.
         power_base: f32 = 0.0;
-        /// The same for the highest.
+        /// Power of the eye with respect to the sphere of the highest clouds, m^2.
         power_top: f32 = 0.0;
-        /// The same for the highest that shade the air, be they procedural or the user's.
+        /// Power of the eye with respect to the sphere of the highest clouds, procedural or user-supplied, that shade
+        /// the air, m^2.
         power_shade: f32 = 0.0;
-        /// The same for the high clouds.
+        /// Power of the eye with respect to the sphere of the high clouds, m^2.
         power_high: f32 = 0.0;
-        /// The same for the top of the air.
+        /// Power of the eye with respect to the sphere of the top of the atmosphere, m^2.
         power_air: f32 = 0.0;
-        /// The distance of the eye from the planet's centre and the part of it along the axis through the origin, together, m
+        /// Distance of the eye from the planet's centre plus its component along the axis through the origin, m
         /// (chart.wgsl).
         chart_reach: f32 = 12742000.0;
-        /// Where the eye is beside that axis, as a share of it: east and north.
+        /// Horizontal position of the eye, east and north, divided by `chart_reach`.
         chart_slope: [f32; 2] = [0.0, 0.0];
-        /// Left, top, right and bottom of a part of the picture that holds the sun's disc, pixels; of a panorama maybe beyond its
-        /// sides. Nothing where it is not in the picture.
+        /// Bounding box of the sun's disc: left, top, right and bottom, pixels. It may exceed the sides of a panorama,
+        /// and is empty if the disc is outside the picture.
         sun_bounds: [f32; 4] = [0.0; 4];
-        /// The same of the moon's.
+        /// Bounding box of the moon's disc, as `sun_bounds`.
         moon_bounds: [f32; 4] = [0.0; 4];
-        /// In how many directions, across and down, each pixel looks at the sky (passes/composite).
+        /// Directions per axis over which the sky is averaged in a pixel (passes/composite).
         sky_samples: u32 = 1;
-        /// The same of the phase function (light.wgsl).
+        /// Directions per axis over which the phase function is averaged in a pixel (light.wgsl).
         phase_samples: u32 = 1;
-        /// 1 where its radiance is known.
+        /// 1 if the radiance of the user's scene is given.
         scene_lit: u32 = 0;
-        /// Distance from which on rays may meet such air, m.
+        /// Distance from which on rays can meet air that clouds shade, m.
         shaft_start: f32 = 0.0;
-        /// How much farther away the last of it is, m.
+        /// Length of the range of distances in which air is shaded, m.
         shaft_length: f32 = 1.0;
     }
 }
 
 crate::params! {
-    /// Sun, moon, clouds and winds as the eye finds them at the time of the frame. Worked out in f64 (frame.rs).
+    /// Sun, moon, clouds and winds relative to the eye at the time of the frame. Computed in f64 (frame.rs).
     Sky {
         /// Lowest altitude of procedural clouds and rain, m.
         shell_base: f32 = 0.0;
-        /// Highest.
+        /// Highest altitude of procedural clouds, m.
         shell_top: f32 = 1.0;
-        /// Highest altitude of the first deck, m.
+        /// Highest altitude of the lower deck, m.
         lower_top: f32 = 1.0;
-        /// How much the second deck shows, 0 where its cover is 0.
+        /// Fraction of its height range that the upper deck is given, 0 at a coverage of 0.
         upper_shown: f32 = 0.0;
-        /// How far rain falls, as a share of its way to the ground.
+        /// Fraction of the way to the ground that rain falls.
         rain_reach: f32 = 0.0;
-        /// The shortest of the scales by which the base shape varies: of what `quality.leap` is a share, m.
+        /// Shortest scale of variation of the base shape, m; `quality.leap` is relative to it.
         leap_scale: f32 = 1.0;
-        /// Extinction where the density is 1: the largest of clouds, upper clouds and rain, 1/m.
+        /// Extinction at density 1: the largest of clouds, upper deck and rain, 1/m.
         extinction: f32 = 0.0;
-        /// That of the clouds as a share of it.
+        /// Extinction of the lower deck relative to `extinction`.
         share: f32 = 1.0;
-        /// That of the upper clouds.
+        /// Extinction of the upper deck relative to `extinction`.
         upper_share: f32 = 0.0;
-        /// That of the rain.
+        /// Extinction of the rain relative to `extinction`.
         rain_share: f32 = 0.0;
         /// Lowest corner of the user's grid, relative to the eye, m.
         volume_low: [f32; 3] = [0.0; 3];
-        /// Highest corner.
+        /// Highest corner of the user's grid, relative to the eye, m.
         volume_high: [f32; 3] = [0.0; 3];
-        /// Its voxels in a metre along each axis.
+        /// Voxels of the user's grid per metre along each axis.
         volume_scale: [f32; 3] = [0.0; 3];
-        /// The shortest side of a voxel, m.
+        /// Shortest side of a voxel, m.
         voxel: f32 = 0.0;
-        /// Of the fit of cloud droplets (droplets.wgsl): g of its Henyey-Greenstein lobe, g and alpha of Draine's, and the
-        /// share of that.
+        /// Fit to the phase function of cloud droplets (droplets.wgsl): g of the Henyey-Greenstein lobe, g and alpha of
+        /// the Draine lobe, weight of the Draine lobe.
         droplet: [f32; 4] = [0.0; 4];
-        /// By what the sky map is multiplied (atmosphere.wgsl).
+        /// Factor on the texels of the sky-view LUT (atmosphere.wgsl).
         sky_scale: f32 = 1024.0;
-        /// By what it is divided: irradiance.
+        /// Irradiance that the texels of the sky-view LUT are divided by.
         sky_unit: [f32; 3] = [1.0; 3];
         /// Unit vector toward the sun.
         sun_direction: [f32; 3] = [0.0, 0.0, 1.0];
-        /// The same of the frame before.
+        /// Unit vector toward the sun in the previous frame.
         previous_sun: [f32; 3] = [0.0, 0.0, 1.0];
-        /// The middle of the spot to keep clear, relative to the eye, m.
+        /// Centre of the region kept clear of clouds, relative to the eye, m.
         clear_at: [f32; 2] = [0.0, 0.0];
-        /// Its radius, m.
+        /// Radius of the region kept clear of clouds, m.
         clear_radius: f32 = 0.0;
         /// Unit vector toward which the wind blows.
         wind_direction: [f32; 2] = [0.0, 1.0];
-        /// Where the eye stands in the base shape's tile, after the wind, with the z of altitude 0.
+        /// Position of the eye in the tile of the base shape after advection, from 0 to 1; z belongs to altitude 0.
         shape_origin: [f32; 3] = [0.0, 0.0, 0.0];
-        /// The same in the detail's tile.
+        /// Position of the eye in the tile of the detail noise, as `shape_origin`.
         detail_origin: [f32; 3] = [0.0, 0.0, 0.0];
-        /// The same in the curl noise's tile.
+        /// Position of the eye in the tile of the curl noise.
         curl_origin: [f32; 2] = [0.0, 0.0];
-        /// The same in the weather map (v down).
+        /// Position of the eye in the weather map (v down).
         weather_origin: [f32; 2] = [0.0, 0.0];
-        /// Where the eye stands in the larger weather map (v down).
+        /// Position of the eye in the large-scale weather map (v down).
         broad_origin: [f32; 2] = [0.0, 0.0];
-        /// By what its texels are multiplied.
+        /// Factor on the texels of the large-scale weather map.
         broad_scale: f32 = 0.0;
-        /// The most that it shifts anything by.
+        /// Largest offset by the large-scale weather map.
         broad_most: f32 = 0.0;
-        /// By how many of its tiles the smaller one is bent where the larger map's alpha is 1.
+        /// Distortion of the weather map where the alpha of the large-scale map is 1, in tiles of the weather map.
         broad_bend: f32 = 0.0;
-        /// How much longer at most a way in the smaller map becomes by that.
+        /// Largest relative elongation of paths in the weather map by that distortion.
         broad_stretch: f32 = 0.0;
-        /// How far the rain has fallen, in the noise, which is squeezed along its streaks, m.
+        /// Distance that rain has fallen, in the space of the noise, which is compressed along the streaks, m.
         rain_fall: f32 = 0.0;
-        /// Unit vector toward which the upper deck's wind blows.
+        /// Unit vector toward which the wind of the upper deck blows.
         upper_direction: [f32; 2] = [0.0, 1.0];
-        /// As `shape_origin`, for the upper deck.
+        /// Position of the eye in the tile of the base shape of the upper deck, as `shape_origin`.
         upper_shape_origin: [f32; 3] = [0.0, 0.0, 0.0];
-        /// As `detail_origin`.
+        /// Position of the eye in the tile of the detail noise of the upper deck, as `shape_origin`.
         upper_detail_origin: [f32; 3] = [0.0, 0.0, 0.0];
-        /// As `curl_origin`.
+        /// Position of the eye in the tile of the curl noise of the upper deck.
         upper_curl_origin: [f32; 2] = [0.0, 0.0];
-        /// As `weather_origin`.
+        /// Position of the eye in the weather map for the upper deck (v down).
         upper_weather_origin: [f32; 2] = [0.0, 0.0];
-        /// The same in the high clouds' texture, along and across their wind.
+        /// Position of the eye in the texture of the high clouds, along and across their wind.
         high_origin: [f32; 2] = [0.0, 0.0];
-        /// The same in the second, broader read of that texture.
+        /// Position of the eye in the second, larger-scale read of the texture of the high clouds.
         high_broad_origin: [f32; 2] = [0.0, 0.0];
-        /// Unit vector along the high clouds' wind.
+        /// Unit vector along the wind of the high clouds.
         high_direction: [f32; 2] = [0.0, 1.0];
-        /// How far each of the four large octaves of the high clouds is from its old update to its new one.
+        /// Weight of the new update in the crossfade of each of the four largest octaves of the high clouds.
         high_age: [f32; 4] = [0.0; 4];
-        /// The same for the four small ones.
+        /// Weight of the new update in the crossfade of each of the four smallest octaves of the high clouds.
         high_age_small: [f32; 4] = [0.0; 4];
-        /// Number of the old update of the large octaves.
+        /// Index of the old update of each of the four largest octaves of the high clouds.
         high_update: [f32; 4] = [0.0; 4];
-        /// The same for the small ones.
+        /// Index of the old update of each of the four smallest octaves of the high clouds.
         high_update_small: [f32; 4] = [0.0; 4];
         /// Unit vector toward the moon.
         moon_direction: [f32; 3] = [0.0, 0.0, 1.0];
-        /// Its irradiance.
+        /// Irradiance of the moon.
         moon_light: [f32; 3] = [0.0; 3];
-        /// Unit vector at right angles to that toward the moon, to the side of it that the sun lights.
+        /// Unit vector perpendicular to `moon_direction`, toward the lit side of the moon.
         moon_bright: [f32; 3] = [1.0, 0.0, 0.0];
-        /// Cosine of the angle at the moon between sun and eye: 1 when it is full.
+        /// Cosine of the phase angle, at the moon between sun and eye; 1 at full moon.
         moon_phase: f32 = 1.0;
-        /// Side of a texel of the user's shadow map, or of the finest level of the ground's (ground_shadow.wgsl), m.
+        /// Texel size of the user's shadow map, or of the finest level of the shadow clipmap on the ground
+        /// (ground_shadow.wgsl), m.
         shadow_texel: f32 = 1.0;
-        /// Where the eye is in those levels, after the wind, m from their middle.
+        /// Position of the eye relative to the centre of the shadow clipmap, after advection, m.
         shadow_eye: [f32; 2] = [0.0; 2];
     }
 }
 
 crate::params! {
-    /// Which pixels or rays a dispatch is for.
+    /// Range of pixels or rays of a dispatch.
     Dispatch {
-        /// First row of this band of the picture (of the marched rows, in `march`).
+        /// First row of this slice, in pixels of the picture (in `march`, in marched rows).
         first_row: u32 = 0;
-        /// Rows of this band.
+        /// Number of rows of this slice.
         rows: u32 = 1;
         /// First column of the pixels of a disc of light (passes/composite).
         first_column: u32 = 0;
-        /// How many columns they are.
+        /// Number of columns of those pixels; in passes/points the number of points.
         columns: u32 = 1;
-        /// First row that the buffers hold: where this sheet begins (of the marched rows, in `march`).
+        /// First row of the strip that the buffers hold, in pixels of the picture (in `march`, in marched rows).
         strip_row: u32 = 0;
-        /// Rows that they hold.
+        /// Number of rows of the strip.
         strip_rows: u32 = 1;
-        /// Every how many pixels one is marched, in both directions.
+        /// Spacing of marched pixels along both axes, pixels.
         stride: u32 = 1;
-        /// Which of them, across.
+        /// Offset of the marched pixel in its cell, across, pixels.
         subpixel_x: u32 = 0;
-        /// Which of them, down.
+        /// Offset of the marched pixel in its cell, down, pixels.
         subpixel_y: u32 = 0;
-        /// Pixels marched in a row.
+        /// Number of marched pixels per row.
         march_width: u32 = 1;
-        /// Every how many of those a ray is known, in both directions (passes/refine).
+        /// Spacing of the samples of adaptive sampling along both axes, in marched pixels (passes/refine).
         lattice: u32 = 1;
-        /// 1 when the rays look for cloud where their neighbours have found it, 0 when they look everywhere.
+        /// 1 if rays search for cloud only in the range where their neighbours found it, 0 if along their full length.
         spans: u32 = 0;
-        /// Threads among which the device shares the workgroups of a dispatch, 1 unless it is a processor (workgroups.wgsl).
+        /// Worker threads among which a CPU device distributes workgroups; 1 on a GPU (workgroups.wgsl).
         threads: u32 = 1;
-        /// Rays of the list in this dispatch (passes/march, passes/reference, passes/path).
+        /// Number of listed rays in this dispatch (passes/march, passes/reference, passes/path).
         active_rays: u32 = 0;
-        /// The first of them (passes/march).
+        /// Index of the first ray in the list (passes/march).
         first_ray: u32 = 0;
-        /// Turns that each may take.
+        /// Maximum number of loop iterations of each ray in this dispatch.
         budget: u32 = 0;
     }
 }
 
-/// A uniform block of several parts.
+/// Uniform block of several parts.
 pub(crate) fn uniform(parts: &[&dyn Block]) -> Binding {
     Binding::block(&schema::words(parts))
 }
 
 impl Dispatch {
-    /// Its uniform block, by name.
+    /// Binding of this block, by name.
     pub(crate) fn binding(&self, gpu: &Gpu) -> (&'static str, Binding) {
         ("dispatch", uniform(&[&Self { threads: gpu.threads, ..self.clone() }]))
     }

@@ -1,6 +1,6 @@
-//! Where the winds have carried what they carry, and how much cover there is: closed forms in time, in f64. No frame is
-//! stepped through, so a picture a month on is as exact as the first, and frames may come in any order. Where winds change,
-//! `drift` says how far the winds of before have carried things ([`Params::after`], [`Between`]).
+//! Advection by the winds and variation of the cloud cover: closed forms in time, in f64. No frame is integrated from
+//! the one before, so a picture at a month is as exact as the first, and frames may be rendered in any order. After a
+//! change of the winds, `drift` holds the displacements by the winds before it ([`Params::after`], [`Between`]).
 
 use std::f64::consts::TAU;
 
@@ -8,78 +8,82 @@ use glam::{DVec2, DVec3};
 
 use crate::directions::compass;
 use crate::error::{Error, Result};
-use crate::params::{Drift, HighClouds, Params, UpperClouds, Wind, Wander};
+use crate::params::{Drift, HighClouds, Params, UpperClouds, Wander, Wind};
 use crate::schema::Block as _;
 
-/// How many slow turns a wander is the mean of.
-const TURNS: i32 = 4;
-/// Ratio of their periods: the fourth root of 3, whose first four powers have no sum of whole numbers that is 0. So no turn
-/// follows from the others, and they never come round together. (The golden and the plastic number have such sums.) The
-/// fastest takes two thirds of `wander.period`, the slowest half as long again.
+/// Number of sinusoids that a wander averages.
+const SINUSOIDS: i32 = 4;
+/// Ratio of consecutive periods: the fourth root of 3. Its powers from 0 to 3 are linearly independent over the
+/// integers, so no sinusoid follows from the others and they never realign. (Powers of the golden ratio and of the
+/// plastic number are dependent.) The shortest period is two thirds of `wander.period`, the longest one and a half
+/// times.
 const RATIO: f64 = 1.316_074_012_952_492_5;
-/// Steps of a swing of the cover: each is new shadows and new majorants, and changes no pixel that one would see.
+/// Quantization steps of the variation of cloud cover. Each step rebakes shadows and majorants, and is too small to be
+/// visible.
 const COVER_STEPS: f64 = 1024.0;
 
-/// What the phases of the wind and of the cover are drawn for.
+/// Quantity that the phases are drawn for.
 #[derive(Clone, Copy)]
-enum Of {
+enum Quantity {
     Wind,
     Cover,
 }
 
 impl Wander {
-    /// Angular velocity in 1/s, every second one the other way round, and phase at 0 s of each turn of a wander that is so
-    /// many periods ahead.
-    fn turns(&self, of: Of, swings: f64) -> impl Iterator<Item = (f64, f64)> {
+    /// Angular velocity in rad/s, with alternating sign, and phase in radians at 0 s of each sinusoid. The wander
+    /// starts `swings` periods ahead.
+    fn sinusoids(&self, quantity: Quantity, swings: f64) -> impl Iterator<Item = (f64, f64)> {
         let (mean, seed) = (f64::from(self.period), self.seed);
-        (0..TURNS).map(move |turn| {
-            let period = mean * RATIO.powf(f64::from(turn) - 0.5 * f64::from(TURNS - 1));
+        (0..SINUSOIDS).map(move |turn| {
+            let period = mean * RATIO.powf(f64::from(turn) - 0.5 * f64::from(SINUSOIDS - 1));
             let sign = if turn % 2 == 0 { 1.0 } else { -1.0 };
-            let random = pcg3d([seed, turn as u32, of as u32])[0];
+            let random = pcg3d([seed, turn as u32, quantity as u32])[0];
             let omega = sign * TAU / period;
             (omega, f64::from(random) / 2f64.powi(32) * TAU + omega * (swings * mean))
         })
     }
 
-    /// For how many seconds a wind has blown, along its mean and across it to the left, in `time` seconds. Its velocity
-    /// is the mean one times 1 + wind x mean of exp(i (omega t + phase)), in complex numbers, which has this integral.
-    fn way(&self, swings: f64, time: f64) -> DVec2 {
+    /// Displacement by gusts from 0 s to `time`, in seconds of the mean wind: along it and to its left. As complex
+    /// numbers the velocity of a wind is its mean times 1 + wind x mean of exp(i (omega t + phase)); this is the
+    /// integral of the second term.
+    fn gust_displacement(&self, swings: f64, time: f64) -> DVec2 {
         let gusts: DVec2 = self
-            .turns(Of::Wind, swings)
+            .sinusoids(Quantity::Wind, swings)
             .map(|(omega, phase)| {
                 let (from, to) = (phase.sin_cos(), (omega * time + phase).sin_cos());
                 DVec2::new(to.0 - from.0, from.1 - to.1) / omega
             })
             .sum();
-        f64::from(self.wind) / f64::from(TURNS) * gusts
+        f64::from(self.wind) / f64::from(SINUSOIDS) * gusts
     }
 
-    /// The cover at a time, for a mean of `coverage`.
+    /// Cloud cover at a time in s, for a mean of `coverage`.
     fn cover(&self, coverage: f32, swings: f64, time: f64) -> f32 {
-        let sum: f64 = self.turns(Of::Cover, swings).map(|(omega, phase)| (omega * time + phase).sin()).sum();
-        let swing = (sum / f64::from(TURNS) * COVER_STEPS).round() / COVER_STEPS;
+        let sum: f64 = self.sinusoids(Quantity::Cover, swings).map(|(omega, phase)| (omega * time + phase).sin()).sum();
+        let swing = (sum / f64::from(SINUSOIDS) * COVER_STEPS).round() / COVER_STEPS;
         (coverage + self.coverage * swing as f32).clamp(0.0, 1.0)
     }
 }
 
 impl Params {
-    /// The sky at a time: what wanders has its value of then, and all that reads it need not know.
+    /// Parameters at a time in s, with the variation of the cloud cover applied.
     pub fn at(&self, time: f64) -> Self {
         let mut now = self.clone();
         now.clouds.coverage = self.wander.cover(self.clouds.coverage, self.drift.swings, time);
         now
     }
 
-    /// The drift with which this sky goes on from another: at `time` all that winds carry is where `before` has it.
+    /// Drift with which this sky continues the motion of another: at `time` in s all displacements equal those of
+    /// `before`.
     pub fn after(&self, before: &Self, time: f64) -> Drift {
         if self.has_winds_of(before) {
-            // To the bit, without a sum and a difference.
+            // Bit-exact: no sum and difference.
             return before.drift.clone();
         }
         Advection::at(before, time).drift_of(self, time)
     }
 
-    /// Whether what winds carry moves as in another sky.
+    /// Whether two skies have the same winds.
     pub fn has_winds_of(&self, other: &Self) -> bool {
         fn winds(params: &Params) -> (&Wind, &Wander, [f32; 5]) {
             let UpperClouds { direction, speed, .. } = params.upper_clouds;
@@ -90,41 +94,43 @@ impl Params {
     }
 }
 
-/// How far each wind has carried what it carries from one time to another, m; or how fast it does, m/s.
+/// Displacements by the winds between two times in m, or their velocities in m/s.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Advection {
-    /// The base shapes, east and north, as the next four.
+    /// Base shapes, east and north.
     pub shape: DVec2,
-    /// The detail.
+    /// Detail, east and north.
     pub detail: DVec2,
-    /// The weather map.
+    /// Weather map, east and north.
     pub weather: DVec2,
-    /// The upper deck, its weather with its shapes.
+    /// Upper deck (shapes and weather), east and north.
     pub upper: DVec2,
-    /// Its detail, which is as much faster as that of the deck below.
+    /// Detail of the upper deck, east and north. Its speed relative to the shapes equals that of the lower deck.
     pub upper_detail: DVec2,
-    /// The high clouds, along their direction and to the left of it: the layer turns with its wind, about the origin of the
-    /// world. About where the origin has been carried, a turn of a degree would move it by kilometres.
+    /// High clouds, along their direction and to its left. The layer rotates with its direction about the origin of the
+    /// world: about the displaced origin, a degree would move it by kilometres.
     pub high: DVec2,
-    /// Upward, shapes and detail.
+    /// Upward displacement of shapes and detail.
     pub rise: f64,
-    /// How often the largest shapes of the high clouds have been replaced.
+    /// Number of replacements of the largest octave of the high clouds.
     pub evolution: f64,
-    /// How many of its periods the wander has gone.
+    /// Number of periods of the wander.
     pub swings: f64,
 }
 
-/// Numbers of [`Advection`] in a row.
+/// Length of [`Advection::numbers`].
 pub const NUMBERS: usize = 15;
 
 impl Advection {
-    /// By one sky's winds.
+    /// Displacements by the winds of a sky between two times in s, without its drift.
     pub fn new(params: &Params, from: f64, to: f64) -> Self {
         let (wind, upper, high) = (&params.wind, &params.upper_clouds, &params.high_clouds);
         let (wander, swings) = (&params.wander, params.drift.swings);
-        // Difference by difference: the way to either time may be too long for f64 where the way between is not.
-        let seconds = DVec2::new(to - from, 0.0) + (wander.way(swings, to) - wander.way(swings, from));
-        // Of a wind that does not wander exactly its speed times the time.
+        // Difference of each term first: a displacement from 0 s may exceed the range of f64 where the one between the
+        // times does not.
+        let seconds = DVec2::new(to - from, 0.0)
+            + (wander.gust_displacement(swings, to) - wander.gust_displacement(swings, from));
+        // Without variation the displacement is exactly speed times time.
         let by = |direction: f32, speed: f32| rotate_by(compass(f64::from(direction)) * f64::from(speed), seconds);
         Self {
             shape: by(wind.direction, wind.speed),
@@ -139,12 +145,12 @@ impl Advection {
         }
     }
 
-    /// To a time, and by what has been before.
+    /// Displacements from 0 s to a time in s, including the drift of the sky.
     pub fn at(params: &Params, time: f64) -> Self {
         Self::from(&params.drift).plus(&Self::new(params, 0.0, time), 1.0)
     }
 
-    /// From one sky at a time to another at another.
+    /// Displacements from one sky at one time to another sky at another time, s.
     pub(crate) fn between((before, from): (&Params, f64), (params, to): (&Params, f64)) -> Self {
         if params.has_winds_of(before) && params.drift == before.drift {
             return Self::new(params, from, to);
@@ -152,15 +158,15 @@ impl Advection {
         Self::at(params, to).plus(&Self::at(before, from), -1.0)
     }
 
-    /// The drift of a sky that has carried things so far at a time.
+    /// Drift of a sky whose displacements at a time in s, including the drift, are these.
     pub fn drift_of(&self, params: &Params, time: f64) -> Drift {
         let swings = self.swings - time / f64::from(params.wander.period);
-        // The gusts are those of where the wander is.
+        // The gusts depend on the time offset of the wander.
         let ahead = Params { drift: Drift { swings, ..Drift::default() }, ..params.clone() };
         Drift { swings, ..Drift::from(&self.plus(&Self::new(&ahead, 0.0, time), -1.0)) }
     }
 
-    /// The sum with so many times another.
+    /// Sum with a multiple of another: `self + times * other`.
     #[must_use]
     pub fn plus(&self, other: &Self, times: f64) -> Self {
         let (mut sum, other) = (self.numbers(), other.numbers());
@@ -168,7 +174,7 @@ impl Advection {
         Self::from(sum)
     }
 
-    /// All numbers in a row.
+    /// All components as an array, in the order of the fields.
     pub fn numbers(&self) -> [f64; NUMBERS] {
         let Self { shape, detail, weather, upper, upper_detail, high, rise, evolution, swings } = *self;
         let [a, b, c, d, e, f] = [shape, detail, weather, upper, upper_detail, high].map(|v| v.to_array());
@@ -176,8 +182,8 @@ impl Advection {
         [a, x, b, y, c, z, d, u, e, v, f, w, rise, evolution, swings]
     }
 
-    /// In gusts, as complex numbers.
-    fn blown(mut self, gust: DVec2) -> Self {
+    /// Velocities rotated and scaled by a gust, as complex numbers.
+    fn with_gust(mut self, gust: DVec2) -> Self {
         let Self { shape, detail, weather, upper, upper_detail, high, .. } = &mut self;
         for wind in [shape, detail, weather, upper, upper_detail, high] {
             *wind = rotate_by(*wind, gust);
@@ -185,8 +191,8 @@ impl Advection {
         self
     }
 
-    /// How far the clouds have drifted. What the eye follows is the silhouette: it drifts with the weather, and its
-    /// billows with the base shape.
+    /// Apparent displacement of the clouds in m: silhouettes move with the weather map, their billows with the base
+    /// shapes. The mean of both is used.
     pub(crate) fn drift(&self) -> DVec3 {
         ((self.weather + self.shape) * 0.5).extend(0.5 * self.rise)
     }
@@ -219,72 +225,76 @@ impl From<&Advection> for Drift {
     }
 }
 
-/// The product of two complex numbers.
+/// Product of two complex numbers.
 fn rotate_by(a: DVec2, b: DVec2) -> DVec2 {
     DVec2::new(a.x * b.x - a.y * b.y, a.y * b.x + a.x * b.y)
 }
 
-/// The winds on the way from one sky to another, as `nubis.lerp` has them: speeds in a straight line, directions on the
-/// shorter arc, the wander by its period of each moment.
+/// Winds interpolated between two skies as by `nubis.lerp`: speeds linearly, directions along the shorter arc, the
+/// wander by its instantaneous period.
 pub struct Between<'a> {
-    /// The sky at the start and that at the end.
+    /// Skies at the start and at the end.
     pub skies: [&'a Params; 2],
-    /// Start and end, s.
+    /// Start and end in s.
     pub span: [f64; 2],
-    /// Whether the way is slow at both ends.
+    /// Whether the interpolation is a smoothstep instead of linear.
     pub smooth: bool,
 }
 
-/// Nodes and weights of Gauss and Legendre's quadrature by eight points on -1 to 1 (the other half of them mirrored). Exact
-/// for polynomials to the 15th degree; of the pieces of [`Between::piece`] it misses 1e-15.
+/// Positive nodes and weights of eight-point Gauss-Legendre quadrature on -1 to 1; the negative nodes mirror them.
+/// Exact for polynomials up to degree 15; the error on the segments of [`Between::segment_end`] is 1e-15.
 const GAUSS: [(f64, f64); 4] = [
     (0.183_434_642_495_649_8, 0.362_683_783_378_362),
     (0.525_532_409_916_329, 0.313_706_645_877_887_3),
     (0.796_666_477_413_626_7, 0.222_381_034_453_374_5),
     (0.960_289_856_497_536_3, 0.101_228_536_290_376_3),
 ];
-/// Most periods of a wind that wanders from one sky to another: a tenth of a second to integrate.
-const MOST_PERIODS: f64 = 16384.0;
+/// Maximum number of wander periods between two skies whose winds wander: it takes a tenth of a second to integrate.
+const MAX_PERIODS: f64 = 16384.0;
 
-/// Nodes and weights between two numbers.
+/// Quadrature nodes and weights between two numbers.
 fn gauss(from: f64, to: f64) -> impl Iterator<Item = (f64, f64)> {
     let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
     GAUSS.into_iter().flat_map(move |(x, w)| [(middle - half * x, half * w), (middle + half * x, half * w)])
 }
 
 impl Between<'_> {
-    /// The integral of all velocities and rates from the start to a time of the span, for a wander that is `swings` ahead at
-    /// the start.
+    /// Integral of all velocities and rates from the start of the span to a time in it, s. The wander starts `swings`
+    /// periods ahead.
+    ///
+    /// Returns [`Error::Parameter`] if the winds wander and the span exceeds 16384 periods.
     pub fn carried(&self, swings: f64, time: f64) -> Result<Advection> {
         let [start, end] = self.span;
         let gusty = self.skies.iter().any(|sky| sky.wander.wind > 0.0);
         let periods =
             (end - start) / self.skies.map(|sky| f64::from(sky.wander.period)).into_iter().fold(f64::MAX, f64::min);
-        if gusty && periods > MOST_PERIODS {
-            let allowed = format!("at most {MOST_PERIODS} times wander.period where winds change and wander");
+        if gusty && periods > MAX_PERIODS {
+            let allowed = format!("at most {MAX_PERIODS} times wander.period where winds change and wander");
             return Err(Error::parameter("keys time between two", end - start, allowed));
         }
-        let turns = self.skies.map(|sky| {
+        let sinusoids = self.skies.map(|sky| {
             let wander = Wander { period: 1.0, ..sky.wander.clone() };
-            wander.turns(Of::Wind, 0.0).collect::<Vec<_>>()
+            wander.sinusoids(Quantity::Wind, 0.0).collect::<Vec<_>>()
         });
         let seconds = end - start;
         let last = ((time - start) / seconds).clamp(0.0, 1.0);
         let mut sum = Advection { swings, ..Advection::default() };
         let mut at = 0.0;
         while at < last {
-            let next = self.piece(at, gusty).min(last);
+            let next = self.segment_end(at, gusty).min(last);
             let before = sum.swings;
             for (u, weight) in gauss(at, next) {
-                let share = self.share(u);
+                let share = self.second_weight(u);
                 let mut rates = self.rates(share);
                 if gusty {
-                    let gone: f64 = gauss(at, u).map(|(v, weight)| weight * self.rates(self.share(v)).swings).sum();
+                    let gone: f64 =
+                        gauss(at, u).map(|(v, weight)| weight * self.rates(self.second_weight(v)).swings).sum();
                     let swings = before + seconds * gone;
                     let turn = |&(omega, phase): &(f64, f64)| DVec2::from_angle((omega * swings + phase) % TAU);
-                    let gust = turns[usize::from(share >= 0.5)].iter().map(turn).sum::<DVec2>() / f64::from(TURNS);
+                    let gust =
+                        sinusoids[usize::from(share >= 0.5)].iter().map(turn).sum::<DVec2>() / f64::from(SINUSOIDS);
                     let [a, b] = self.skies.map(|sky| f64::from(sky.wander.wind));
-                    rates = rates.blown(DVec2::X + (a + share * (b - a)) * gust);
+                    rates = rates.with_gust(DVec2::X + (a + share * (b - a)) * gust);
                 }
                 sum = sum.plus(&rates, seconds * weight);
             }
@@ -294,25 +304,25 @@ impl Between<'_> {
         Ok(sum)
     }
 
-    /// Where a piece ends that begins at a share of the time: a quarter of the way, a quarter of the wander's period (its
-    /// fastest turn then goes 140 degrees), and so short that the period changes by a quarter. None goes over the middle, where
-    /// what has nothing between switches.
-    fn piece(&self, at: f64, gusty: bool) -> f64 {
+    /// End of the quadrature segment that starts at a fraction of the span. A segment is at most a quarter of the span,
+    /// at most a quarter of the wander period (140 degrees of the fastest sinusoid), and so short that the period
+    /// changes by at most a quarter. No segment crosses the middle, where values that are not interpolated switch.
+    fn segment_end(&self, at: f64, gusty: bool) -> f64 {
         let [from, to] = self.skies.map(|sky| f64::from(sky.wander.period));
-        let period = from + self.share(at) * (to - from);
+        let period = from + self.second_weight(at) * (to - from);
         let seconds = if gusty { self.span[1] - self.span[0] } else { 0.0 };
-        // A smooth way is up to half as steep again as a straight one.
+        // The slope of smoothstep is up to 1.5.
         let length = [0.25 * period / seconds, period / (6.0 * (to - from).abs())].into_iter().fold(0.25, f64::min);
         let next = at + length;
         if at < 0.5 { next.min(0.5) } else { next }
     }
 
-    /// How much of the second sky there is at a share of the time.
-    fn share(&self, u: f64) -> f64 {
+    /// Weight of the second sky at a fraction of the span.
+    fn second_weight(&self, u: f64) -> f64 {
         if self.smooth { u * u * (3.0 - 2.0 * u) } else { u }
     }
 
-    /// Velocities, and what else goes by a second, where there is so much of the second sky; without gusts.
+    /// Velocities and rates at a weight of the second sky, without gusts.
     fn rates(&self, share: f64) -> Advection {
         let line = |of: &dyn Fn(&Params) -> f32| {
             let [a, b] = self.skies.map(|sky| f64::from(of(sky)));
@@ -338,47 +348,47 @@ impl Between<'_> {
     }
 }
 
-/// What has carried the sky of an animation whose winds change from shot to shot.
+/// Continuation of the clouds of an animation whose winds change from shot to shot.
 #[derive(Default)]
 pub(crate) struct Going {
-    /// The sky that was asked for last, its time, and what it lacked.
+    /// Sky of the previous shot, its time in s, and the displacements added to its drift.
     last: Option<(Params, f64, Advection)>,
 }
 
-/// Longest time between two shots in which a sky goes on, s; as for the rest of the history.
-const LONGEST_SHOT: f64 = 300.0;
+/// Maximum time in s between two shots that continue each other; the same as for the rest of the history.
+const MAX_SHOT_INTERVAL: f64 = 300.0;
 
 impl Going {
-    /// The sky that a shot shows: where its winds are not those of the shot before, it goes on from where it is. The winds change
-    /// half way between the two, which is what the integral of an even change is. Shots that say their drift themselves
-    /// (`Keyframes`, `Params::after`) need nothing; nor does what comes after a cut.
+    /// Sky of a shot. If its winds differ from those of the previous shot, the clouds continue from where they are. The
+    /// winds change half-way between the two shots, which gives the integral of a linear change. A shot with a drift of
+    /// its own (`Keyframes`, `Params::after`) or after a cut is not changed.
     pub fn on(&mut self, params: &Params, time: f64, cut: bool) -> Params {
-        let last = self.last.take().filter(|(_, then, _)| !cut && (time - then).abs() <= LONGEST_SHOT);
-        let mut lacked = last.as_ref().map_or_else(Advection::default, |(.., lacked)| *lacked);
-        let with = |params: &Params, lacked: &Advection| {
-            let drift = Drift::from(&Advection::from(&params.drift).plus(lacked, 1.0));
+        let last = self.last.take().filter(|(_, then, _)| !cut && (time - then).abs() <= MAX_SHOT_INTERVAL);
+        let mut added = last.as_ref().map_or_else(Advection::default, |(.., added)| *added);
+        let with = |params: &Params, added: &Advection| {
+            let drift = Drift::from(&Advection::from(&params.drift).plus(added, 1.0));
             Params { drift, ..params.clone() }
         };
         if let Some((before, then, _)) = &last
             && before.drift == params.drift
             && !params.has_winds_of(before)
         {
-            let drift = params.after(&with(before, &lacked), 0.5 * (time + then));
-            lacked = Advection::from(&drift).plus(&Advection::from(&params.drift), -1.0);
+            let drift = params.after(&with(before, &added), 0.5 * (time + then));
+            added = Advection::from(&drift).plus(&Advection::from(&params.drift), -1.0);
         }
-        let mut now = with(params, &lacked);
+        let mut now = with(params, &added);
         let allowed =
             |(index, field): (usize, &crate::schema::Field)| field.check("drift", &now.drift.get(index)).is_ok();
         if !Drift::FIELDS.iter().enumerate().all(allowed) {
-            // After a time that is beyond all sense.
-            (now, lacked) = (params.clone(), Advection::default());
+            // The continued drift is out of range after an extreme time.
+            (now, added) = (params.clone(), Advection::default());
         }
-        self.last = Some((params.clone(), time, lacked));
+        self.last = Some((params.clone(), time, added));
         now
     }
 }
 
-/// The largest speed at which anything that casts a shadow may move, m/s.
+/// Upper bound of the speed of shadow casters, m/s.
 pub(crate) fn fastest(params: &Params) -> f64 {
     let wind = &params.wind;
     let upper = if params.has_upper_clouds() { params.upper_clouds.speed.abs() } else { 0.0 };
@@ -386,7 +396,7 @@ pub(crate) fn fastest(params: &Params) -> f64 {
     f64::from(level.max(wind.updraft.abs()))
 }
 
-/// Three 32-bit hashes of three (pcg3d: Jarzynski and Olano, "Hash Functions for GPU Rendering", JCGT 2020).
+/// Hash of three 32-bit integers to three (pcg3d: Jarzynski and Olano, "Hash Functions for GPU Rendering", JCGT 2020).
 fn pcg3d(v: [u32; 3]) -> [u32; 3] {
     let mix = |[x, y, z]: [u32; 3]| {
         let x = x.wrapping_add(y.wrapping_mul(z));
@@ -406,7 +416,7 @@ mod tests {
         Params { wander: Wander { wind, coverage: 0.3, seed, ..Wander::default() }, ..Params::default() }
     }
 
-    /// Displacements of all winds, in the order of their mean velocities.
+    /// Displacements by all winds, in the order of `means`.
     fn carried(params: &Params, from: f64, to: f64) -> [DVec2; 4] {
         let Advection { shape, detail, weather, high, .. } = Advection::new(params, from, to);
         [shape, detail, weather, high]
@@ -418,16 +428,16 @@ mod tests {
             (wind.direction, wind.speed),
             (wind.detail_direction, wind.detail_speed),
             (wind.weather_direction, wind.weather_speed),
-            // In the frame of its own direction.
+            // Relative to the direction of the high clouds.
             (90.0, high.speed),
         ]
         .map(|(direction, speed)| compass(f64::from(direction)) * f64::from(speed))
     }
 
-    /// The velocity in place of its integral: the mean of turning vectors, as complex numbers.
+    /// Gust as a fraction of the mean velocity: the mean of rotating unit vectors, as complex numbers.
     fn gust(wander: &Wander, time: f64) -> DVec2 {
         let turn = |(omega, phase): (f64, f64)| DVec2::from_angle(omega * time + phase);
-        wander.turns(Of::Wind, 0.0).map(turn).sum::<DVec2>() / f64::from(TURNS)
+        wander.sinusoids(Quantity::Wind, 0.0).map(turn).sum::<DVec2>() / f64::from(SINUSOIDS)
     }
 
     #[test]
@@ -440,17 +450,17 @@ mod tests {
         }
     }
 
-    /// Central differences over a second err by the third derivative, 1e-9 of the velocity, and by rounding: 1e-16 of
-    /// the way.
+    /// Errors of central differences over a second: 1e-9 of the velocity by the third derivative, 1e-16 of the
+    /// displacement by rounding.
     #[test]
-    fn the_way_is_the_integral_of_the_velocity() {
+    fn displacements_are_integrals_of_velocities() {
         let params = wandering(0.7, 3);
         for time in [0.0, 1.0, 1800.0, -5000.0, 86_400.0, 2.6e6] {
             let gust = gust(&params.wander, time);
             let slopes = carried(&params, time - 0.5, time + 0.5);
             let whole = [carried(&params, 0.0, time - 0.5), carried(&params, 0.0, time + 0.5)];
             for (i, mean) in means(&params).into_iter().enumerate() {
-                // A complex product: stretched by the gust and turned by it.
+                // Complex product: the gust scales and rotates the mean.
                 let velocity =
                     mean + 0.7 * DVec2::new(gust.x * mean.x - gust.y * mean.y, gust.y * mean.x + gust.x * mean.y);
                 assert!(slopes[i].distance(velocity) < 1e-6, "{i} at {time} s: {} {velocity}", slopes[i]);
@@ -461,8 +471,8 @@ mod tests {
         assert_eq!(carried(&params, 0.0, 0.0), [DVec2::ZERO; 4]);
     }
 
-    /// Never more than the share, about zero in the mean, half of it as a rule (four vectors of a quarter in any
-    /// direction), and both along the wind and across.
+    /// Gusts are at most 1, with zero mean and an rms of a half (four vectors of length a quarter in random
+    /// directions), equal along and across the wind.
     #[test]
     fn gusts_are_bounded_and_have_no_mean() {
         for seed in 0..20 {
@@ -496,20 +506,20 @@ mod tests {
         let (least, most) = covers.iter().fold((1f32, 0f32), |(a, b), &c| (a.min(c), b.max(c)));
         assert!((0.15..0.2).contains(&least) && (0.7..=0.75).contains(&most), "{least} {most}");
         for second in 0..20_000 {
-            // In a second by less than the fastest turn, 0.3 x 2 pi / 4770 s, and a step.
+            // Change per second: at most that of the fastest sinusoid, 0.3 x 2 pi / 4770 s, and one step.
             let [a, b] = [0.0, 1.0].map(|dt| params.at(f64::from(second) + dt).clouds.coverage);
             assert!((a - b).abs() < 4e-4 + 0.3 / COVER_STEPS as f32);
         }
         let mut wild = params.clone();
         wild.wander.coverage = 1.0;
         assert!((0..1000).all(|i| (0.0..=1.0).contains(&wild.at(f64::from(i) * 500.0).clouds.coverage)));
-        // What does not wander is what the user has said.
+        // Without variation the parameters stay as given.
         wild.wander.coverage = 0.0;
         assert_eq!(wild.at(1234.5), wild);
     }
 
     #[test]
-    fn any_time_is_a_time() {
+    fn extreme_times_have_finite_results() {
         let params = wandering(1.0, 1);
         for time in [1e-300, -1e300, f64::MAX, f64::MIN] {
             assert!(Advection::new(&params, time, time).drift() == DVec3::ZERO);

@@ -1,14 +1,14 @@
-//! Adapters: what there are, which of them is meant, and the guard against forks.
+//! Adapters: enumeration, selection, and the guard against forked processes.
 
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
 use crate::error::{Error, Result};
 
-/// What an adapter says of itself.
+/// Description of an adapter.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct AdapterInfo {
-    /// Its name, such as `llvmpipe (LLVM 15.0.6, 256 bits)`.
+    /// Name, such as `llvmpipe (LLVM 15.0.6, 256 bits)`.
     pub name: String,
     /// Driver and version.
     pub driver: String,
@@ -16,20 +16,20 @@ pub struct AdapterInfo {
     pub backend: String,
     /// `discrete`, `integrated`, `virtual`, `cpu` or `other`.
     pub kind: String,
-    /// PCI bus address, empty where there is none.
+    /// PCI bus address; empty if there is none.
     pub pci: String,
 }
 
 static PROCESS: AtomicU32 = AtomicU32::new(0);
 static INSTANCE: OnceLock<wgpu::Instance> = OnceLock::new();
 
-/// Locks a mutex whose data no panic can leave half-written.
+/// Locks a mutex and ignores poisoning; for data that no panic leaves half-written.
 pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// An error in a child that was forked after the driver had started threads: they do not exist there, and the first
-/// call would wait for them for ever.
+/// Returns [`Error::Fork`] in a child process forked after the driver started threads. The threads do not exist in the
+/// child, and the first call would wait for them forever.
 pub fn check_fork() -> Result<()> {
     let ours = std::process::id();
     match PROCESS.load(Ordering::Relaxed) {
@@ -39,30 +39,30 @@ pub fn check_fork() -> Result<()> {
     }
 }
 
-/// What the environment should hold, by name, before anything loads the driver. It is for programs to set when they start:
-/// it cannot be set safely once there are threads.
+/// Environment variables, as names and values, that must be set before the driver is loaded. Programs set them at
+/// start-up: setting them is unsound once there are other threads.
 ///
-/// Mesa's layer `VK_LAYER_MESA_device_select` asks Wayland for its device and prints an error for each instance where
-/// `XDG_RUNTIME_DIR` is no folder, as on every machine without a screen. It is left out there, unless the user has a say in
-/// it: adapters are chosen here by kind.
+/// Mesa's layer `VK_LAYER_MESA_device_select` asks Wayland for its device, and prints an error for each instance if
+/// `XDG_RUNTIME_DIR` is not a folder, as on every machine without a display. The layer is switched off there, unless
+/// the user has configured it: adapters are selected here by kind.
 pub fn driver_settings() -> Vec<(&'static str, &'static str)> {
     let wayland = std::env::var_os("XDG_RUNTIME_DIR").is_some_and(|folder| std::path::Path::new(&folder).is_absolute());
-    let wished = ["NODEVICE_SELECT", "MESA_VK_DEVICE_SELECT", "MESA_VK_DEVICE_SELECT_FORCE_DEFAULT_DEVICE"];
-    let wished = wished.into_iter().any(|name| std::env::var_os(name).is_some());
-    if wayland || wished { Vec::new() } else { vec![("NODEVICE_SELECT", "1")] }
+    let configured = ["NODEVICE_SELECT", "MESA_VK_DEVICE_SELECT", "MESA_VK_DEVICE_SELECT_FORCE_DEFAULT_DEVICE"];
+    let configured = configured.into_iter().any(|name| std::env::var_os(name).is_some());
+    if wayland || configured { Vec::new() } else { vec![("NODEVICE_SELECT", "1")] }
 }
 
-/// The way to the drivers.
+/// wgpu instance, the connection to the drivers.
 pub(super) fn instance() -> &'static wgpu::Instance {
     INSTANCE.get_or_init(|| {
         let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
-        // Never OpenGL: it is not even compiled in.
+        // OpenGL is not compiled in.
         descriptor.backends = wgpu::Backends::VULKAN | wgpu::Backends::METAL | wgpu::Backends::DX12;
         wgpu::Instance::new(descriptor)
     })
 }
 
-/// The adapters, best first: discrete, integrated, virtual, other, CPU.
+/// Adapters, best first: discrete, integrated, virtual, other, CPU.
 pub(super) fn enumerate() -> Result<Vec<wgpu::Adapter>> {
     check_fork()?;
     PROCESS.store(std::process::id(), Ordering::Relaxed);
@@ -96,12 +96,15 @@ pub(super) fn describe(adapter: &wgpu::Adapter) -> AdapterInfo {
     }
 }
 
-/// The adapters that can be used, best first.
+/// Usable adapters, best first.
+///
+/// Returns [`Error::Fork`] in a forked child.
 pub fn adapters() -> Result<Vec<AdapterInfo>> {
     Ok(enumerate()?.iter().map(describe).collect())
 }
 
-/// Which of `adapters` `wanted` means: an index, a kind, or a part of its name, driver or PCI address.
+/// Index of the requested adapter. `wanted` is an index, a kind, or a part of its name, driver or PCI address; None
+/// selects the first.
 pub(super) fn choose(adapters: &[AdapterInfo], wanted: Option<&str>) -> Result<usize> {
     let list = || {
         let lines: Vec<_> = adapters

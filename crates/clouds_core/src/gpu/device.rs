@@ -1,4 +1,4 @@
-//! The device: opened once per process, its textures and buffers, and waiting for it without hanging.
+//! Device: opened once per process and adapter; creation of textures and buffers; waits that cannot hang.
 
 use std::any::{Any, TypeId};
 use std::collections::HashMap;
@@ -15,69 +15,69 @@ use super::link::Generated;
 use crate::error::{Error, Result};
 use crate::shared::constants;
 
-/// Asked while waiting: an error stops the work (Ctrl-C).
+/// Interrupt check, called during waits: an error stops the work (Ctrl-C).
 pub type Interrupt<'a> = &'a dyn Fn() -> Result<()>;
 
-/// How long one submission, meant to take half a second, may take before the device counts as hung.
-const HUNG: Duration = Duration::from_secs(300);
-/// How long to wait between looks at the caller's interrupt.
-const SLICE: Duration = Duration::from_millis(100);
+/// Time after which a submission, planned to take half a second, counts as hung.
+const HANG_TIMEOUT: Duration = Duration::from_secs(300);
+/// Interval between calls of the interrupt check during a wait.
+const POLL_INTERVAL: Duration = Duration::from_millis(100);
 
-// Never dropped: some drivers crash when a device goes away while the process exits.
-static OPEN: Mutex<Vec<(usize, Arc<Gpu>)>> = Mutex::new(Vec::new());
+// Never dropped: some drivers crash when a device is destroyed while the process exits.
+static OPEN_DEVICES: Mutex<Vec<(usize, Arc<Gpu>)>> = Mutex::new(Vec::new());
 
-/// An open device with all that is shared by the renderers on it.
+/// Open device and the resources that its renderers share.
 pub struct Gpu {
-    /// The adapter.
+    /// Its adapter.
     pub info: AdapterInfo,
     adapter: wgpu::Adapter,
     pub(crate) device: wgpu::Device,
     pub(crate) queue: wgpu::Queue,
-    /// Most bytes that one buffer can hold for a shader.
+    /// Maximum size of a storage buffer in bytes.
     pub(crate) max_buffer: u64,
-    /// Threads among which it shares the workgroups of a dispatch, where it is a processor; else 1.
+    /// Worker threads among which a CPU device distributes the workgroups of a dispatch; 1 on a GPU.
     pub(crate) threads: u32,
     pub(crate) repeat_sampler: wgpu::Sampler,
     pub(crate) clamp_sampler: wgpu::Sampler,
     pub(crate) mirror_sampler: wgpu::Sampler,
-    /// A flat texture and one with a depth, of a texel each, for what a kernel could read and does not.
+    /// Placeholder textures of one texel, 2D and 3D, for bindings that a kernel declares but does not read.
     pub(crate) nothing: [wgpu::TextureView; 2],
-    /// What renderers share, one of each type.
+    /// Resources shared by renderers, one of each type.
     shared: Mutex<HashMap<TypeId, Arc<dyn Any + Send + Sync>>>,
-    /// The modules of its shaders that are no files.
+    /// Generated modules of its shaders.
     pub(crate) generated: Generated,
     submissions: AtomicU64,
     waits: AtomicU64,
-    /// What the driver has compiled.
+    /// Pipeline cache.
     pub(crate) pipelines: Pipelines,
     pub(crate) nanoseconds_per_tick: Option<f64>,
     failure: Arc<Mutex<Failure>>,
-    waiting: mpsc::Sender<Waiting>,
+    waiter: mpsc::Sender<WaitRequest>,
 }
 
-/// A submission, and who is told when it is done.
-type Waiting = (wgpu::SubmissionIndex, mpsc::Sender<Result<wgpu::PollStatus, wgpu::PollError>>);
+/// Submission, and the channel that is notified when it is done.
+type WaitRequest = (wgpu::SubmissionIndex, mpsc::Sender<Result<wgpu::PollStatus, wgpu::PollError>>);
 
-/// Waits for submissions, one after the other, for as long as they take: wgpu 30 panics where the time that a wait may take
-/// ends while another thread submits to the same device (gfx-rs/wgpu pull request 9958).
-fn start_waiting(device: wgpu::Device) -> mpsc::Sender<Waiting> {
-    let (sender, receiver) = mpsc::channel::<Waiting>();
+/// Thread that waits for submissions, one after the other, without a timeout: wgpu 30 panics if a wait times out while
+/// another thread submits to the same device (gfx-rs/wgpu pull request 9958).
+fn spawn_waiter(device: wgpu::Device) -> mpsc::Sender<WaitRequest> {
+    let (sender, receiver) = mpsc::channel::<WaitRequest>();
     thread::spawn(move || {
         for (index, done) in receiver {
             let poll = wgpu::PollType::Wait { submission_index: Some(index), timeout: None };
-            // Nobody listens where the work was interrupted.
+            // Without a receiver after an interrupt.
             let _ = done.send(device.poll(poll));
         }
     });
     sender
 }
 
-/// What is asked of a device.
-fn limits(adapter: &wgpu::Adapter) -> wgpu::Limits {
+/// Limits to request from an adapter.
+fn required_limits(adapter: &wgpu::Adapter) -> wgpu::Limits {
     let offered = adapter.limits();
-    // What the code needs and no more, but as long a buffer as there is: it bounds the size of `animate`'s frames.
-    // `march` names 17 textures; Vulkan promises 16, drivers have 96 and more. `reproject` names 10 buffers; Vulkan promises
-    // 4, drivers of desktops have 16 and more.
+    // Limits that the code needs and no more, except for the largest possible buffers: they bound the size of
+    // `animate`'s frames. `march` binds 17 textures; Vulkan guarantees 16, drivers have 96 and more. `reproject` binds
+    // 10 storage buffers; Vulkan guarantees 4, desktop drivers have 16 and more.
     wgpu::Limits {
         max_sampled_textures_per_shader_stage: 17,
         max_storage_buffers_per_shader_stage: 10,
@@ -87,8 +87,8 @@ fn limits(adapter: &wgpu::Adapter) -> wgpu::Limits {
     }
 }
 
-/// A texel of nothing.
-fn nothing(device: &wgpu::Device, dimension: wgpu::TextureDimension) -> wgpu::TextureView {
+/// Placeholder texture of one texel.
+fn placeholder(device: &wgpu::Device, dimension: wgpu::TextureDimension) -> wgpu::TextureView {
     let texture = device.create_texture(&wgpu::TextureDescriptor {
         label: Some("nothing"),
         size: wgpu::Extent3d { width: 1, height: 1, depth_or_array_layers: 1 },
@@ -104,21 +104,22 @@ fn nothing(device: &wgpu::Device, dimension: wgpu::TextureDimension) -> wgpu::Te
 
 #[derive(Default)]
 struct Failure {
-    /// The first error that no call has reported yet.
+    /// First error that no call has reported yet.
     error: Option<String>,
     lost: bool,
-    /// The thread of the window that shares the device, whose errors are its own.
+    /// Thread of the window that shares the device; its errors are ignored.
     window: Option<thread::ThreadId>,
 }
 
 impl Gpu {
-    /// The device of the adapter that `wanted` means, opened on first use with the generated modules of its shaders; with none, the best.
+    /// Device of an adapter, opened on first use with the generated modules of its shaders. None selects the best
+    /// adapter.
     pub(crate) fn open_with(wanted: Option<&str>, generated: Generated) -> Result<Arc<Self>> {
         check_fork()?;
         let adapters = enumerate()?;
         let infos: Vec<_> = adapters.iter().map(describe).collect();
         let index = choose(&infos, wanted)?;
-        let mut open = lock(&OPEN);
+        let mut open = lock(&OPEN_DEVICES);
         open.retain(|(_, gpu)| !lock(&gpu.failure).lost);
         if let Some((_, gpu)) = open.iter().find(|(i, _)| *i == index) {
             return Ok(gpu.clone());
@@ -128,10 +129,11 @@ impl Gpu {
         Ok(gpu)
     }
 
-    /// What a window needs that shows pictures of this device without bringing them to memory. Calling thread: the window's
-    /// from here on, which renders no clouds. Errors of that thread cost the window one of its frames and are no errors of
-    /// the renderer: a surface whose size changes while the device is busy cannot be configured, and what is then drawn to
-    /// it at the new size is refused, until the device has time.
+    /// Handles for a window that presents pictures of this device without a readback.
+    ///
+    /// The calling thread becomes the window's thread and must not render clouds. Errors on that thread cost the window
+    /// a frame and are not reported to renderers: a surface that is resized while the device is busy cannot be
+    /// configured, and drawing to it at the new size fails until the device is idle.
     pub fn shared(&self) -> (wgpu::Instance, wgpu::Adapter, wgpu::Device, wgpu::Queue) {
         lock(&self.failure).window = Some(thread::current().id());
         let instance = adapter::instance().clone();
@@ -140,14 +142,14 @@ impl Gpu {
 
     fn new(adapter: &wgpu::Adapter, info: AdapterInfo, generated: Generated) -> Result<Self> {
         let timestamps = wgpu::Features::TIMESTAMP_QUERY & adapter.features();
-        let keeps = wgpu::Features::PIPELINE_CACHE & adapter.features();
-        // Where a processor renders, its memory is ours, and what it has made is read in place: of a frame of 1920x1080, which takes
-        // 115 ms, the copy took 5. On other devices that would slow them down.
+        let pipeline_cache = wgpu::Features::PIPELINE_CACHE & adapter.features();
+        // Readback in place on a CPU device, whose memory is host memory: at 1920x1080 it saves a copy of 5 ms of a
+        // frame of 115 ms. On other devices mappable storage buffers are slower.
         let in_place = if info.kind == "cpu" { IN_PLACE & adapter.features() } else { wgpu::Features::empty() };
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("nubis"),
-            required_features: timestamps | keeps | in_place,
-            required_limits: limits(adapter),
+            required_features: timestamps | pipeline_cache | in_place,
+            required_limits: required_limits(adapter),
             ..Default::default()
         };
         let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
@@ -155,7 +157,7 @@ impl Gpu {
 
         let failure = Arc::new(Mutex::new(Failure::default()));
         let reported = failure.clone();
-        // Without this wgpu panics on the first error. wgpu calls it on the thread of the call that failed.
+        // Without a handler wgpu panics on the first error. wgpu calls it on the thread of the failing call.
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
             let mut failure = lock(&reported);
             if failure.window != Some(thread::current().id()) {
@@ -170,7 +172,7 @@ impl Gpu {
         });
 
         let pipelines = Pipelines::new(&device, adapter, &info);
-        // Where it refuses the file, there is no cache, and nothing is wrong.
+        // A rejected cache file is not an error; there is no pipeline cache then.
         lock(&failure).error = None;
         let sampler = |label, address| {
             device.create_sampler(&wgpu::SamplerDescriptor {
@@ -180,7 +182,7 @@ impl Gpu {
                 address_mode_w: address,
                 mag_filter: wgpu::FilterMode::Linear,
                 min_filter: wgpu::FilterMode::Linear,
-                // One mip is read, not two.
+                // One mip level per read, not two.
                 mipmap_filter: wgpu::MipmapFilterMode::Nearest,
                 ..Default::default()
             })
@@ -195,7 +197,7 @@ impl Gpu {
             mirror_sampler: sampler("mirror_sampler", wgpu::AddressMode::MirrorRepeat),
             max_buffer: adapter.limits().max_storage_buffer_binding_size.min(adapter.limits().max_buffer_size),
             nothing: [wgpu::TextureDimension::D2, wgpu::TextureDimension::D3]
-                .map(|dimension| nothing(&device, dimension)),
+                .map(|dimension| placeholder(&device, dimension)),
             shared: Mutex::default(),
             generated,
             submissions: AtomicU64::new(0),
@@ -203,28 +205,28 @@ impl Gpu {
             pipelines,
             nanoseconds_per_tick: (!timestamps.is_empty()).then(|| f64::from(queue.get_timestamp_period())),
             failure,
-            waiting: start_waiting(device.clone()),
+            waiter: spawn_waiter(device.clone()),
             device,
             queue,
         })
     }
 
-    /// What all renderers of the device share of a type.
+    /// Resource of a type, shared by all renderers of the device and created on first use.
     pub(crate) fn common<T: Any + Send + Sync + Default>(&self) -> Arc<T> {
         let mut shared = lock(&self.shared);
         let slot = shared.entry(TypeId::of::<T>()).or_insert_with(|| Arc::new(T::default()));
         slot.clone().downcast().expect("is kept by its type")
     }
 
-    /// How many submissions the device has had, and how often one was waited for.
+    /// Numbers of submissions and of waits for them since the device was opened.
     pub fn counters(&self) -> [u64; 2] {
         [&self.submissions, &self.waits].map(|counter| counter.load(Ordering::Relaxed))
     }
 
-    /// The first error since the last call, if any.
+    /// Reports the first error since the last call.
     pub(crate) fn check(&self) -> Result<()> {
         let Some(mut error) = lock(&self.failure).error.take() else { return Ok(()) };
-        // What is asked of a lost device is refused before it says that it is lost.
+        // A lost device refuses requests before it reports its loss.
         let _ = self.device.poll(wgpu::PollType::Poll);
         let mut failure = lock(&self.failure);
         if failure.lost {
@@ -240,12 +242,12 @@ impl Gpu {
         Err(Error::Device(format!("{error}{advice}")))
     }
 
-    /// A buffer of `bytes` for shaders.
+    /// Storage buffer of `bytes` bytes.
     pub(crate) fn buffer(&self, label: &str, bytes: u64) -> wgpu::Buffer {
         self.buffer_for(label, bytes, wgpu::BufferUsages::empty())
     }
 
-    /// The same for what is large and brought back often: in place, where that can be.
+    /// Storage buffer for large and frequent readbacks: mapped in place if the device supports it.
     pub(crate) fn picture_buffer(&self, label: &str, bytes: u64) -> wgpu::Buffer {
         let in_place = self.device.features().contains(IN_PLACE);
         let usage = if in_place { wgpu::BufferUsages::MAP_READ } else { wgpu::BufferUsages::empty() };
@@ -265,12 +267,12 @@ impl Gpu {
         })
     }
 
-    /// A buffer for the arguments of indirect dispatches, which are uniform blocks too.
+    /// Buffer of arguments for indirect dispatches, also bound as uniforms.
     pub(crate) fn arguments(&self, bytes: u64) -> wgpu::Buffer {
         self.buffer_for("arguments", bytes, wgpu::BufferUsages::INDIRECT)
     }
 
-    /// A buffer that timestamps are resolved into.
+    /// Buffer for resolved timestamps.
     pub(crate) fn resolved(&self, bytes: u64) -> wgpu::Buffer {
         self.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("timestamps"),
@@ -289,7 +291,7 @@ impl Gpu {
         })
     }
 
-    /// A buffer that holds a uniform block of `bytes`.
+    /// Buffer for uniform blocks of `bytes` bytes.
     pub(crate) fn uniform(&self, label: &str, bytes: usize) -> wgpu::Buffer {
         self.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some(label),
@@ -299,8 +301,8 @@ impl Gpu {
         })
     }
 
-    /// A half-float texture of four channels; a depth of 1 makes it flat. Half floats filter exactly on lavapipe, where
-    /// 8-bit ones have 256 levels (docs/numerics.md), and four channels of them can be stored to on every adapter.
+    /// Half-float storage texture of four channels; 2D if its depth is 1. lavapipe filters half floats exactly, 8-bit
+    /// texels with 256 levels (docs/numerics.md). Every adapter supports stores to four half-float channels.
     pub(crate) fn texture(&self, label: &str, size: [u32; 3], mips: u32) -> wgpu::Texture {
         let dimension = if size[2] == 1 { wgpu::TextureDimension::D2 } else { wgpu::TextureDimension::D3 };
         self.allocate(
@@ -313,19 +315,20 @@ impl Gpu {
         )
     }
 
-    /// The same, but never flat.
+    /// Half-float storage texture of four channels, 3D even with a depth of 1.
     pub(crate) fn texture_3d(&self, label: &str, size: [u32; 3]) -> wgpu::Texture {
         let (dimension, storage) = (wgpu::TextureDimension::D3, wgpu::TextureUsages::STORAGE_BINDING);
         self.allocate(label, size, 1, dimension, wgpu::TextureFormat::Rgba16Float, storage)
     }
 
-    /// A flat texture of one or two channels, to be filled from here or from a buffer, as it cannot be stored to everywhere.
+    /// 2D texture of one or two channels. It is filled from the host or from a buffer, as not every adapter supports
+    /// stores to its format.
     pub(crate) fn flat(&self, label: &str, [width, height]: [u32; 2], format: wgpu::TextureFormat) -> wgpu::Texture {
         let dimension = wgpu::TextureDimension::D2;
         self.allocate(label, [width, height, 1], 1, dimension, format, wgpu::TextureUsages::empty())
     }
 
-    /// The same with a depth, and mips.
+    /// 3D texture with mips, filled as [`Gpu::flat`].
     pub(crate) fn volume(&self, label: &str, size: [u32; 3], mips: u32, format: wgpu::TextureFormat) -> wgpu::Texture {
         self.allocate(label, size, mips, wgpu::TextureDimension::D3, format, wgpu::TextureUsages::empty())
     }
@@ -352,7 +355,7 @@ impl Gpu {
         })
     }
 
-    /// Fills a texture with texels, row by row.
+    /// Uploads texels, row by row.
     pub(crate) fn write_texture<T: bytemuck::NoUninit>(&self, texture: &wgpu::Texture, texels: &[T]) {
         let bytes_per_row = Some(size_of::<T>() as u32 * texture.width());
         self.queue.write_texture(
@@ -363,41 +366,43 @@ impl Gpu {
         );
     }
 
-    /// Fills a texture and its mips with the [`texture_bytes`] of [`texture_rows`].
+    /// Uploads all mips of a texture from bytes of [`texture_rows`], [`texture_bytes`] in number.
     pub(crate) fn restore_texture(&self, texture: &wgpu::Texture, bytes: &[u8]) {
         for (target, layout, size) in mips(texture, 1) {
             self.queue.write_texture(target, bytes, layout, size);
         }
     }
 
-    /// Hands commands over.
+    /// Submits commands.
     pub(crate) fn submit(&self, commands: wgpu::CommandEncoder) -> wgpu::SubmissionIndex {
         self.submissions.fetch_add(1, Ordering::Relaxed);
         self.queue.submit([commands.finish()])
     }
 
-    /// Waits for a submission and those before, or until `interrupt` fails.
+    /// Waits for a submission and all before it, or until `interrupt` fails.
+    ///
+    /// Returns [`Error::Device`] after an error, a loss or a hang of the device.
     pub(crate) fn wait(&self, index: wgpu::SubmissionIndex, interrupt: Interrupt<'_>) -> Result<()> {
         self.waits.fetch_add(1, Ordering::Relaxed);
         let started = Instant::now();
         let (done, is_done) = mpsc::channel();
         let ended = || Error::Device("internal error, please report it".into());
-        self.waiting.send((index, done)).map_err(|_| ended())?;
+        self.waiter.send((index, done)).map_err(|_| ended())?;
         loop {
-            match is_done.recv_timeout(SLICE) {
+            match is_done.recv_timeout(POLL_INTERVAL) {
                 Ok(Ok(_)) => return self.check(),
                 Err(RecvTimeoutError::Timeout) => {
                     self.check()?;
                     interrupt()?;
-                    if started.elapsed() > HUNG {
+                    if started.elapsed() > HANG_TIMEOUT {
                         return Err(Error::Device(format!(
                             "{} has not answered for {} s; make a new Renderer, or choose another adapter",
                             self.info.name,
-                            HUNG.as_secs()
+                            HANG_TIMEOUT.as_secs()
                         )));
                     }
                 }
-                // A lost device says so first.
+                // The loss of the device takes precedence.
                 Ok(Err(error)) => return self.check().and(Err(Error::Device(error.to_string()))),
                 Err(RecvTimeoutError::Disconnected) => return self.check().and(Err(ended())),
             }
@@ -405,12 +410,12 @@ impl Gpu {
     }
 }
 
-/// Milliseconds on the GPU by kernel, in the order in which they first ran.
+/// GPU time in ms by kernel, in the order of first use.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Timings(pub Vec<(String, f64)>);
 
 impl Timings {
-    /// Adds time to a kernel's row.
+    /// Adds time to a kernel.
     pub fn add(&mut self, label: &str, milliseconds: f64) {
         match self.0.iter_mut().find(|(name, _)| name == label) {
             Some((_, total)) => *total += milliseconds,
@@ -419,15 +424,15 @@ impl Timings {
     }
 }
 
-/// Buffers that shaders write and we read.
+/// Feature for storage buffers that the host maps.
 const IN_PLACE: wgpu::Features = wgpu::Features::MAPPABLE_PRIMARY_BUFFERS;
 
 constants! {
-    /// What the rows of a texture that is copied to or from a buffer are padded to, bytes (WebGPU).
+    /// Row alignment in bytes of texture copies to and from buffers (WebGPU).
     pub(crate) const COPIED: u32 = wgpu::COPY_BYTES_PER_ROW_ALIGNMENT;
 }
 
-/// The mips of a texture of half floats, and where their texels lie in memory, one mip after the other, their rows padded.
+/// Mips of a texture and their layout in memory: one after the other, with rows padded to a multiple of `padded` bytes.
 pub(crate) fn mips(
     texture: &wgpu::Texture,
     padded: u32,
@@ -445,7 +450,7 @@ pub(crate) fn mips(
     })
 }
 
-/// The rows that `Recorder::download_texture` gave, without what pads them.
+/// Rows of a downloaded texture (`Recorder::download_texture`) without padding.
 pub(crate) fn texture_rows<'a>(texture: &'a wgpu::Texture, bytes: &'a [u8]) -> impl Iterator<Item = &'a [u8]> {
     let padded = mips(texture, COPIED).zip(mips(texture, 1));
     padded.flat_map(move |((_, layout, size), (_, tight, _))| {
@@ -455,7 +460,7 @@ pub(crate) fn texture_rows<'a>(texture: &'a wgpu::Texture, bytes: &'a [u8]) -> i
     })
 }
 
-/// How many bytes a texture and its mips have, with rows padded.
+/// Size of a texture with its mips in bytes, with rows padded to a multiple of `padded` bytes.
 pub(crate) fn texture_bytes(texture: &wgpu::Texture, padded: u32) -> u64 {
     let bytes = |layout: wgpu::TexelCopyBufferLayout, size: wgpu::Extent3d| {
         let row = u64::from(layout.bytes_per_row.unwrap_or(0));
@@ -464,13 +469,13 @@ pub(crate) fn texture_bytes(texture: &wgpu::Texture, padded: u32) -> u64 {
     mips(texture, padded).last().map_or(0, |(_, layout, size)| bytes(layout, size))
 }
 
-/// Bytes that came back from the GPU, in a buffer that is the device's again when they are dropped.
+/// Readback of a buffer range. Dropping it unmaps the buffer.
 pub(crate) struct Download {
     buffer: wgpu::Buffer,
     range: Range<u64>,
-    /// Whether it is mapped, or will be.
+    /// Whether the buffer is mapped or a mapping is pending.
     mapped: bool,
-    /// What is mapped of it, once it is.
+    /// Mapped bytes, once opened.
     view: Option<wgpu::BufferView>,
 }
 
@@ -479,20 +484,20 @@ impl Download {
         Self { buffer, range, mapped: false, view: None }
     }
 
-    /// Asks for it; failures come out when it is there.
+    /// Requests the mapping; [`Download::open`] reports failures.
     pub fn map(&mut self) {
         self.buffer.map_async(wgpu::MapMode::Read, self.range.clone(), |_| {});
         self.mapped = true;
     }
 
-    /// Opens what has come back.
+    /// Opens the mapped range, once the device has completed the mapping.
     pub fn open(&mut self) -> Result<()> {
         let found = self.buffer.get_mapped_range(self.range.clone());
         self.view = Some(found.map_err(|error| Error::Device(error.to_string()))?);
         Ok(())
     }
 
-    /// The bytes as numbers.
+    /// Bytes as numbers.
     pub fn numbers<T: bytemuck::AnyBitPattern>(&self) -> &[T] {
         self.view.as_ref().map_or(&[], |view| bytemuck::cast_slice(view))
     }
@@ -501,7 +506,7 @@ impl Download {
 impl Drop for Download {
     fn drop(&mut self) {
         self.view = None;
-        // What was interrupted before it was submitted is not.
+        // An interrupt before the submission leaves the buffer unmapped.
         if self.mapped {
             self.buffer.unmap();
         }
@@ -512,7 +517,7 @@ impl Drop for Download {
 mod tests {
     use super::*;
 
-    /// Asks for what no device has: a buffer of 2^60 bytes.
+    /// Fails on every device: a buffer of 2^60 bytes.
     fn err(gpu: &Gpu) {
         let _ = gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: None,

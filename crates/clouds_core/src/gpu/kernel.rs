@@ -1,5 +1,5 @@
-//! A compute pipeline whose resources are bound by name: binding numbers and workgroup sizes stand in WGSL alone, and so does
-//! which `override` constants a kernel is compiled for.
+//! Compute kernels with resources bound by name. WGSL alone defines binding numbers, workgroup sizes and the `override`
+//! constants that a kernel is specialized for; reflection reads them.
 
 use std::borrow::Cow;
 use std::collections::{BTreeSet, HashMap};
@@ -16,31 +16,31 @@ use super::device::Gpu;
 use super::link::Linked;
 use crate::error::{Error, Result};
 
-/// A pass, and an entry point of it.
+/// Pass and entry point.
 pub(crate) type Name = (&'static str, &'static str);
 
-/// Something that a kernel can be given for one of its variables.
+/// Resource for a variable of a kernel.
 #[derive(Clone)]
 pub(crate) enum Binding {
     Buffer(wgpu::Buffer),
     View(wgpu::TextureView),
     Sampler(wgpu::Sampler),
-    /// The words of a uniform block, which is put on the device with the recording.
+    /// Words of a uniform block, uploaded with the recording.
     Block(Arc<[u32]>),
-    /// Arguments of indirect dispatches, by number.
+    /// Range of indirect-dispatch arguments, by number.
     Arguments(Range<u32>),
 }
 
-/// Variables by name.
+/// Resources by variable name.
 pub(crate) type Bindings = Vec<(&'static str, Binding)>;
 
 impl Binding {
-    /// A uniform block.
+    /// Binding of a uniform block.
     pub fn block(words: &[u32]) -> Self {
         Self::Block(words.into())
     }
 
-    /// Bytes of the buffer, or of the texture with its mips: what they hold, without what drivers pad.
+    /// Size in bytes of the buffer, or of the texture with its mips, without padding by the driver.
     pub fn bytes(&self) -> u64 {
         let texture = match self {
             Self::Buffer(buffer) => return buffer.size(),
@@ -75,22 +75,22 @@ impl From<&wgpu::Sampler> for Binding {
     }
 }
 
-/// Values of `override` constants by name. A kernel is compiled for those of them that it reads: what a picture does not need
-/// is compiled out, not branched over.
+/// Specialization table: values of `override` constants by name. A kernel is compiled for the constants that it reads:
+/// unused features are compiled out instead of branched over.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Specialization(Vec<(&'static str, f64)>);
 
 impl Specialization {
-    /// A table.
+    /// Table of the given values.
     pub fn new(values: impl IntoIterator<Item = (&'static str, f64)>) -> Self {
         Self(values.into_iter().collect())
     }
 
-    /// The same with other values.
+    /// Copy with some values replaced or added.
     pub fn with(&self, values: &[(&'static str, f64)]) -> Arc<Self> {
         let mut table = self.clone();
         for (name, value) in values {
-            match table.0.iter_mut().find(|(known, _)| known == name) {
+            match table.0.iter_mut().find(|(key, _)| key == name) {
                 Some((_, old)) => *old = *value,
                 None => table.0.push((name, *value)),
             }
@@ -98,28 +98,28 @@ impl Specialization {
         Arc::new(table)
     }
 
-    /// The names of the constants.
+    /// Names of the constants.
     #[cfg(test)]
     pub fn names(&self) -> impl Iterator<Item = &'static str> {
         self.0.iter().map(|(name, _)| *name)
     }
 
     fn get(&self, name: &str) -> Option<f64> {
-        self.0.iter().find(|(known, _)| *known == name).map(|(_, value)| *value)
+        self.0.iter().find(|(key, _)| *key == name).map(|(_, value)| *value)
     }
 }
 
-/// A pass: its module on the device, and its entry points.
+/// Shader module of a pass on the device, and its entry points.
 pub(crate) struct Program {
     shader: wgpu::ShaderModule,
     entries: HashMap<String, Entry>,
 }
 
-/// What reflection says of an entry point.
+/// Reflection of an entry point.
 struct Entry {
     workgroup: [u32; 3],
     variables: Vec<Variable>,
-    /// The constants that it reads.
+    /// Names of the `override` constants that it reads.
     constants: Vec<String>,
 }
 
@@ -127,11 +127,11 @@ struct Entry {
 struct Variable {
     name: String,
     number: u32,
-    /// Of a texture.
+    /// Dimension of a texture; None for other variables.
     dimension: Option<ImageDimension>,
 }
 
-/// Which kernel of a device: pass, entry and the values of the constants that it reads, by their bits.
+/// Identity of a kernel: pass, entry point, and bits of the values of the constants that it reads.
 pub(crate) type Key = (String, String, Vec<Option<u64>>);
 
 impl Program {
@@ -141,7 +141,7 @@ impl Program {
         Self::from_linked(gpu, &linked)
     }
 
-    /// The same of linked source.
+    /// Program of linked source.
     pub fn from_linked(gpu: &Gpu, linked: &Linked) -> Result<Self> {
         let (module, info) = linked.parse().map_err(Error::Device)?;
         let entries = module.entry_points.iter().enumerate().map(|(index, point)| {
@@ -153,12 +153,13 @@ impl Program {
             (point.name.clone(), entry)
         });
         let entries = entries.collect();
-        // What has been parsed already, not the text.
+        // Reuses the parsed module.
         let source = wgpu::ShaderSource::Naga(Cow::Owned(module));
         let descriptor = wgpu::ShaderModuleDescriptor { label: None, source };
         let checks = wgpu::ShaderRuntimeChecks { force_loop_bounding: false, ..Default::default() };
-        // SAFETY: only loop bounding is off, which costs a counter in every loop (ten times the time on some drivers,
-        // gfx-rs/wgpu#7698). The shaders are this crate's own, and each of their loops ends. Bounds checks stay.
+        // SAFETY: only loop bounding is off. It adds a counter to every loop (ten times the time on some drivers,
+        // gfx-rs/wgpu#7698). All shaders are part of this crate, and each of their loops terminates. Bounds checks stay
+        // on.
         let shader = unsafe { gpu.device.create_shader_module_trusted(descriptor, checks) };
         Ok(Self { shader, entries })
     }
@@ -167,13 +168,13 @@ impl Program {
         self.entries.get(name).ok_or_else(|| Error::Device(format!("no kernel named {name:?}")))
     }
 
-    /// Which kernel a table asks for.
+    /// Identity of the kernel of an entry point with a specialization table.
     pub fn key(&self, (pass, entry): (&str, &str), specialization: &Specialization) -> Result<Key> {
         let values = self.entry(entry)?.constants.iter().map(|name| specialization.get(name).map(f64::to_bits));
         Ok((pass.to_owned(), entry.to_owned(), values.collect()))
     }
 
-    /// Compiles an entry point.
+    /// Compiles an entry point for a specialization table.
     #[expect(clippy::disallowed_methods, reason = "the one place that makes pipelines")]
     pub fn compile(&self, gpu: &Gpu, name: &str, specialization: &Specialization) -> Result<Kernel> {
         let entry = self.entry(name)?;
@@ -197,7 +198,7 @@ impl Program {
     }
 }
 
-/// The constants that a function and those that it calls read.
+/// Names of the `override` constants read by a function and its callees.
 fn used_constants(module: &Module, function: &Function) -> Vec<String> {
     let mut seen = BTreeSet::new();
     let mut found = Vec::new();
@@ -205,13 +206,13 @@ fn used_constants(module: &Module, function: &Function) -> Vec<String> {
     while let Some(function) = functions.pop() {
         let read = function.expressions.iter().filter_map(|(_, expression)| override_of(expression));
         found.extend(read);
-        called(&function.body, &mut |handle| {
+        visit_calls(&function.body, &mut |handle| {
             if seen.insert(handle) {
                 functions.push(&module.functions[handle]);
             }
         });
     }
-    // A constant may be worked out from others.
+    // Initializers of constants may read further constants.
     let mut names = BTreeSet::new();
     while let Some(handle) = found.pop() {
         let constant = &module.overrides[handle];
@@ -238,23 +239,25 @@ fn override_of(expression: &Expression) -> Option<Handle<Override>> {
     }
 }
 
-/// Tells `tell` of each call in a block.
-fn called(block: &Block, tell: &mut impl FnMut(Handle<Function>)) {
+/// Visits each call in a block, nested blocks included.
+fn visit_calls(block: &Block, visit: &mut impl FnMut(Handle<Function>)) {
     for statement in block {
         match statement {
-            Statement::Call { function, .. } => tell(*function),
-            Statement::Block(inner) => called(inner, tell),
-            Statement::If { accept, reject, .. } => [accept, reject].into_iter().for_each(|block| called(block, tell)),
-            Statement::Switch { cases, .. } => cases.iter().for_each(|case| called(&case.body, tell)),
+            Statement::Call { function, .. } => visit(*function),
+            Statement::Block(inner) => visit_calls(inner, visit),
+            Statement::If { accept, reject, .. } => {
+                [accept, reject].into_iter().for_each(|block| visit_calls(block, visit));
+            }
+            Statement::Switch { cases, .. } => cases.iter().for_each(|case| visit_calls(&case.body, visit)),
             Statement::Loop { body, continuing, .. } => {
-                [body, continuing].into_iter().for_each(|block| called(block, tell));
+                [body, continuing].into_iter().for_each(|block| visit_calls(block, visit));
             }
             _ => {}
         }
     }
 }
 
-/// The variables that an entry point uses.
+/// Variables that an entry point uses.
 fn used_variables(module: &Module, info: &ModuleInfo, entry: usize) -> Vec<Variable> {
     let uses = info.get_entry_point(entry);
     let mut variables = Vec::new();
@@ -272,7 +275,7 @@ fn used_variables(module: &Module, info: &ModuleInfo, entry: usize) -> Vec<Varia
     variables
 }
 
-/// A compute pipeline and the variables that it uses.
+/// Compute pipeline with the variables that it uses.
 pub struct Kernel {
     /// Name in timings, benches and GPU debuggers.
     pub label: String,
@@ -282,18 +285,18 @@ pub struct Kernel {
     variables: Vec<Variable>,
 }
 
-/// Where the blocks and the arguments of a recording lie on the device.
+/// Buffers of the uniform blocks and of the dispatch arguments of a recording.
 pub(crate) struct Resources<'a> {
     pub blocks: &'a wgpu::Buffer,
     pub offsets: &'a HashMap<*const u32, u64>,
     pub arguments: &'a wgpu::Buffer,
-    /// Bytes from one set of arguments to the next.
+    /// Bytes between consecutive dispatch arguments.
     pub stride: u64,
 }
 
 impl Kernel {
-    /// A bind group with each used variable's resource: the first of its name. Samplers that are not given bind themselves, and a
-    /// texture that is not given, which a kernel could read and does not, is one texel.
+    /// Bind group with the first resource of the name of each used variable. Missing samplers default to those of the
+    /// device; missing textures, which the kernel declares but does not read, to a placeholder of one texel.
     pub(crate) fn bind(
         &self,
         gpu: &Gpu,
@@ -335,30 +338,30 @@ impl Kernel {
     }
 }
 
-/// A kernel that is there, or is being compiled by whoever holds the lock.
+/// Entry for a kernel: compiled, or empty while the holder of the lock compiles it.
 type Slot = Arc<Mutex<Option<Arc<Kernel>>>>;
 
-/// Kernels, each with the number of its last use.
+/// Cache of kernels with the number of their last use.
 #[derive(Default)]
-struct Kept {
+struct KernelCache {
     slots: HashMap<Key, (Slot, u64)>,
     uses: u64,
 }
 
-/// Programs by name, and kernels, of a device.
+/// Programs and kernels of a device.
 #[derive(Default)]
 struct Kernels {
     programs: Mutex<HashMap<&'static str, Arc<Program>>>,
-    kept: Mutex<Kept>,
+    cache: Mutex<KernelCache>,
 }
 
-/// Most kernels that are kept: on lavapipe one takes 2 to 3 MB, and a picture has ten to thirty.
-const MOST_KERNELS: usize = 48;
+/// Maximum number of cached kernels. On lavapipe a kernel takes 2 to 3 MB; a picture has ten to thirty.
+const MAX_KERNELS: usize = 48;
 
-impl Kept {
-    /// Forgets those whose last use is longest ago, where there are too many.
-    fn forget(&mut self) {
-        while self.slots.len() > MOST_KERNELS {
+impl KernelCache {
+    /// Evicts the least recently used kernels above the limit.
+    fn evict(&mut self) {
+        while self.slots.len() > MAX_KERNELS {
             let Some(oldest) = self.slots.iter().min_by_key(|(_, (_, last_use))| *last_use) else { return };
             let key = oldest.0.clone();
             self.slots.remove(&key);
@@ -367,11 +370,11 @@ impl Kept {
 }
 
 impl Gpu {
-    /// A pass, linked and validated on first use.
+    /// Program of a pass, linked and validated on first use.
     fn program(&self, pass: &'static str) -> Result<Arc<Program>> {
         let kernels = self.common::<Kernels>();
-        let known = lock(&kernels.programs).get(pass).cloned();
-        if let Some(program) = known {
+        let linked = lock(&kernels.programs).get(pass).cloned();
+        if let Some(program) = linked {
             return Ok(program);
         }
         let program = Arc::new(Program::new(self, pass)?);
@@ -382,17 +385,17 @@ impl Gpu {
         let program = self.program(name.0)?;
         let key = program.key(name, specialization)?;
         let common = self.common::<Kernels>();
-        let mut kernels = lock(&common.kept);
+        let mut kernels = lock(&common.cache);
         let use_number = kernels.uses;
         kernels.uses += 1;
         let (slot, last_use) = kernels.slots.entry(key).or_default();
         *last_use = use_number;
         let slot = slot.clone();
-        kernels.forget();
+        kernels.evict();
         Ok((program, slot))
     }
 
-    /// A kernel, compiled on first use.
+    /// Kernel, compiled on first use.
     pub(crate) fn kernel(&self, name: Name, specialization: &Specialization) -> Result<Arc<Kernel>> {
         let (program, slot) = self.slot(name, specialization)?;
         let mut slot = lock(&slot);
@@ -404,17 +407,17 @@ impl Gpu {
         Ok(kernel)
     }
 
-    /// Whether a kernel is there already.
+    /// Whether a kernel is compiled.
     pub(crate) fn is_compiled(&self, name: Name, specialization: &Specialization) -> Result<bool> {
         let (_, slot) = self.slot(name, specialization)?;
-        // One that is being compiled is locked.
+        // The entry is locked during compilation.
         Ok(slot.try_lock().is_ok_and(|slot| slot.is_some()))
     }
 
-    /// Forgets what has been compiled, so that the shaders are read anew.
+    /// Drops all programs and kernels, so that the shaders are read again.
     pub(crate) fn forget_kernels(&self) {
         let kernels = self.common::<Kernels>();
         lock(&kernels.programs).clear();
-        lock(&kernels.kept).slots.clear();
+        lock(&kernels.cache).slots.clear();
     }
 }

@@ -1,29 +1,28 @@
-//! WGSL files and how they find each other: `#import name` on a line of its own brings in the whole of a file, once.
+//! Linker for WGSL files: a line `#import name` includes a file, once.
 
 use std::collections::HashSet;
 use std::path::Path;
 
 include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
 
-/// The text of a module that is no file: written from what Rust declares.
+/// Source of a generated module by its name; None for other names.
 pub(crate) type Generated = fn(&str) -> Option<String>;
 
-/// One self-contained WGSL module, and where each of its lines came from.
+/// Self-contained WGSL module with the origin of each line.
 pub struct Linked {
-    /// The WGSL.
+    /// WGSL source.
     pub code: String,
     lines: Vec<(String, usize)>,
 }
 
 impl Linked {
-    /// Links the file called `root` with all that it imports. WGSL ignores the order of declarations, so importing is
-    /// appending.
+    /// Links the file `root` with all of its imports. The order of WGSL declarations is free, so imports are appended.
     pub(crate) fn new(root: &str, generated: Generated) -> Result<Self, String> {
         let source = read(root, generated).ok_or_else(|| missing(root))?;
         Self::of(root, &source, generated)
     }
 
-    /// Links `source`, which is no file, with all that it imports.
+    /// Links `source` with all of its imports.
     pub(crate) fn from_source(source: &str, generated: Generated) -> Result<Self, String> {
         Self::of("(source)", source, generated)
     }
@@ -51,7 +50,7 @@ impl Linked {
         Ok(linked)
     }
 
-    /// The file and line that line `number` of the linked code came from.
+    /// File and line of origin of line `number` of the linked source, from 1.
     pub fn origin(&self, number: usize) -> String {
         let (file, line) = &self.lines[number - 1];
         match std::env::var_os(FOLDER) {
@@ -60,14 +59,14 @@ impl Linked {
         }
     }
 
-    /// Parses and validates the module; errors name the file and line that the text came from.
+    /// Parses and validates the module; errors name the original file and line.
     pub fn parse(&self) -> Result<(wgpu::naga::Module, wgpu::naga::valid::ModuleInfo), String> {
         use wgpu::naga::{front::wgsl, valid};
         let module = wgsl::parse_str(&self.code).map_err(|error| {
             let line = error.location(&self.code).map_or(1, |at| at.line_number as usize);
             format!("{}: {}", self.origin(line), error.emit_to_string(&self.code))
         })?;
-        // pack2x16float, which every backend that we open has.
+        // For pack2x16float, which every enabled backend supports.
         let capabilities = valid::Capabilities::default() | valid::Capabilities::SHADER_FLOAT16_IN_FLOAT32;
         let info =
             valid::Validator::new(valid::ValidationFlags::all(), capabilities).validate(&module).map_err(|error| {
@@ -78,20 +77,20 @@ impl Linked {
     }
 }
 
-/// The text of a WGSL file or of a generated module.
+/// Source of a WGSL file or of a generated module.
 pub(crate) fn read(name: &str, generated: Generated) -> Option<String> {
     let file = || match std::env::var_os(FOLDER) {
-        // For work on shaders: read from a folder, without building anything again.
+        // Development of shaders: files are read at run time, without a rebuild.
         Some(folder) => std::fs::read_to_string(Path::new(&folder).join(format!("{name}.wgsl"))).ok(),
         None => SHADERS.iter().find(|(file, _)| *file == name).map(|(_, source)| (*source).to_owned()),
     };
     generated(name).or_else(file)
 }
 
-/// The environment variable with the folder that shaders are read from.
+/// Environment variable with the folder that shaders are read from.
 const FOLDER: &str = "NUBIS_SHADERS";
 
-/// An error for a file that [`read`] does not find.
+/// Error message for a file that [`read`] does not find.
 fn missing(name: &str) -> String {
     match std::env::var_os(FOLDER) {
         Some(folder) => format!("{FOLDER} = {folder:?} has no file {name}.wgsl that can be read"),
@@ -99,7 +98,7 @@ fn missing(name: &str) -> String {
     }
 }
 
-/// Every WGSL file by name.
+/// Names of all WGSL files.
 pub fn names() -> impl Iterator<Item = &'static str> {
     SHADERS.iter().map(|(name, _)| *name)
 }

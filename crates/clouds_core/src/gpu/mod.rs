@@ -1,4 +1,5 @@
-//! The device layer: adapters, devices, kernels and recordings. It knows no pass, no frame and no cloud.
+//! Device layer: adapters, devices, kernels, recordings and the disk cache. It does not depend on passes, frames or
+//! clouds.
 
 mod adapter;
 mod device;

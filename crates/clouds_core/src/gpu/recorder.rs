@@ -1,8 +1,9 @@
-//! A recording: what a device does for a picture, as data until it is submitted.
+//! Recorder: the GPU work of a picture, held as data until it is submitted.
 //!
-//! Dispatches, copies and downloads are recorded in order. [`Recorder::submit`] compiles the kernels that they name, encodes
-//! them and waits: once, unless the work may keep the device busy for longer than [`SLICE_SECONDS`]. Then it is submitted in
-//! slices, so that no watchdog resets the device. How long a dispatch may take is learned by kernel, from its timestamps.
+//! Dispatches, copies and readbacks are recorded in order. [`Recorder::submit`] compiles their kernels, encodes them,
+//! and waits once, unless the work may keep the device busy for longer than [`SLICE_SECONDS`]. Longer work is
+//! time-sliced into several submissions, so that no watchdog resets the device. The cost of a dispatch is estimated per
+//! kernel, from timestamps of earlier dispatches.
 
 use std::collections::HashMap;
 use std::mem;
@@ -20,56 +21,56 @@ use super::kernel::{Binding, Bindings, Kernel, Name, Resources, Specialization};
 use crate::error::Result;
 use crate::shared::constants;
 
-/// Longest that one submission usually keeps the device busy, s, and that one dispatch does whose list is as long as it can be: a
-/// fourth of the two seconds after which Windows resets a device. After Ctrl-C two of them go on.
+/// Time budget of a submission in s, also of a dispatch over a list of maximum length: a quarter of the two seconds
+/// after which Windows resets a device. Two submissions complete after Ctrl-C.
 const SLICE_SECONDS: f64 = 0.5;
-/// Most workgroups along one side of a dispatch (WebGPU's default limit).
-const MOST_GROUPS: u32 = 65_535;
-/// What uniform blocks are aligned to, bytes (WebGPU's default limit).
-const ALIGNED: usize = 256;
+/// Maximum number of workgroups along one side of a dispatch (WebGPU's default limit).
+const MAX_GROUPS: u32 = 65_535;
+/// Alignment of uniform blocks in bytes (WebGPU's default limit).
+const UNIFORM_ALIGNMENT: usize = 256;
 
 constants! {
-    /// Bytes from the arguments of one indirect dispatch to those of the next, which are workgroups along each side and
-    /// how many invocations the whole list has: each can be bound as a uniform.
-    const ARGUMENT_STRIDE: u64 = ALIGNED as u64;
-    /// Invocations of a workgroup of a list.
+    /// Bytes between the arguments of consecutive indirect dispatches, so that each can be bound as a uniform.
+    /// Arguments are the workgroups along each side and the number of invocations for the whole list.
+    const ARGUMENT_STRIDE: u64 = UNIFORM_ALIGNMENT as u64;
+    /// Invocations per workgroup of a dispatch over a list.
     const LIST_GROUP: u32 = 64;
-    /// Invocations along each side of a workgroup of a grid that is dispatched under a condition or in slices of rows.
+    /// Invocations along each side of a workgroup of a grid dispatched conditionally or in slices of rows.
     const GRID_GROUP: u32 = 8;
 }
 
-/// Most dispatches of a recording that are timed: WebGPU allows 4,096 queries in a set.
-const MOST_TIMED: usize = 2048;
+/// Maximum number of timed dispatches of a recording: WebGPU allows 4,096 queries in a set.
+const MAX_TIMED: usize = 2048;
 
-/// Tells whether what was recorded has been submitted: a LUT that was recorded and then thrown away is not there.
+/// Tells whether a recording has been submitted: a LUT whose recording was dropped does not exist.
 #[derive(Clone, Default)]
 pub(crate) struct Token(Arc<AtomicBool>);
 
-/// A list that kernels write: entries elsewhere, and here how many there are.
+/// List filled by kernels; the entries are in another buffer.
 pub(crate) struct List<'a> {
     pub count: &'a wgpu::Buffer,
-    /// Most entries that it can have.
+    /// Maximum number of entries.
     pub most: u32,
-    /// Invocations for each entry.
+    /// Invocations per entry.
     pub each: u32,
-    /// Share of those entries that it has as a rule.
+    /// Typical number of entries, as a fraction of the maximum.
     pub likely: f64,
 }
 
-/// What a dispatch runs.
+/// Kernel of a dispatch.
 #[derive(Clone)]
 pub(crate) enum Which {
-    /// A kernel of a pass, compiled for the values of a table.
+    /// Kernel of a pass with a specialization table.
     Named(Name, Arc<Specialization>),
-    /// One that there is.
+    /// Compiled kernel.
     Made(Arc<Kernel>),
 }
 
-/// How many invocations a dispatch has.
+/// Size of a dispatch in invocations.
 #[derive(Clone, Copy)]
 enum Extent {
     Grid([u32; 3]),
-    /// By the arguments of this number, as a rule so many.
+    /// Number of the dispatch arguments, and the expected number of invocations.
     Indirect(u32, f64),
 }
 
@@ -81,33 +82,33 @@ enum Step {
     CopyTexture { texture: wgpu::Texture, staging: wgpu::Buffer },
 }
 
-/// A kernel, and the table that it is compiled for.
-type Wanted = (Name, Arc<Specialization>);
+/// Kernel with its specialization table.
+type PipelineRequest = (Name, Arc<Specialization>);
 
-/// What is done with bytes that have come back.
-type Received = Box<dyn FnOnce(&[u8])>;
+/// Handler of the bytes of a readback.
+type ReadbackHandler = Box<dyn FnOnce(&[u8])>;
 
-/// Work on its way to the device.
+/// Recording of GPU work.
 pub(crate) struct Recorder<'a> {
     pub gpu: &'a Gpu,
-    /// What every dispatch may use, by name.
+    /// Resources that every dispatch may bind, by name.
     scope: Bindings,
     specialization: Arc<Specialization>,
-    /// Where it is 0 no grid is dispatched.
+    /// Buffer whose value must not be 0 for grids to be dispatched.
     condition: Option<wgpu::Buffer>,
     steps: Vec<Step>,
     arguments: u32,
-    /// Kernels that the next recordings may ask for.
-    ahead: Vec<Wanted>,
+    /// Kernels that later recordings may request.
+    ahead: Vec<PipelineRequest>,
     downloads: Vec<Download>,
-    received: Vec<(usize, Received)>,
+    received: Vec<(usize, ReadbackHandler)>,
     token: Token,
     timings: &'a mut Timings,
     interrupt: Interrupt<'a>,
 }
 
 impl<'a> Recorder<'a> {
-    /// An empty recording, whose kernels add to `timings`.
+    /// Empty recording; the times of its kernels are added to `timings`.
     pub fn new(gpu: &'a Gpu, timings: &'a mut Timings, interrupt: Interrupt<'a>) -> Self {
         Self {
             gpu,
@@ -125,65 +126,66 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// Gives variables to every dispatch from here on.
+    /// Binds resources for all further dispatches.
     pub fn bind(&mut self, bindings: impl IntoIterator<Item = (&'static str, Binding)>) {
         for (name, binding) in bindings {
-            match self.scope.iter_mut().find(|(known, _)| *known == name) {
+            match self.scope.iter_mut().find(|(bound, _)| *bound == name) {
                 Some((_, old)) => *old = binding,
                 None => self.scope.push((name, binding)),
             }
         }
     }
 
-    /// Names and bytes of what every dispatch may use.
+    /// Names of the bound resources and their sizes in bytes.
     pub fn held(&self) -> Vec<(&'static str, u64)> {
         self.scope.iter().map(|(name, binding)| (*name, binding.bytes())).filter(|(_, bytes)| *bytes > 0).collect()
     }
 
-    /// Compiles kernels from here on for the values of a table; returns that before.
+    /// Sets the specialization table of further dispatches; returns the previous one.
     pub fn specialize(&mut self, specialization: Arc<Specialization>) -> Arc<Specialization> {
         mem::replace(&mut self.specialization, specialization)
     }
 
-    /// The same for the table so far with other values.
+    /// Replaces or adds values in the specialization table of further dispatches; returns the previous table.
     pub fn specialize_with(&mut self, values: &[(&'static str, f64)]) -> Arc<Specialization> {
         let table = self.specialization.with(values);
         self.specialize(table)
     }
 
-    /// Whether what was recorded with a token is there for what is recorded now: it has been submitted, or comes before.
+    /// Whether the results recorded with a token are available to further dispatches: submitted already, or earlier in
+    /// this recording.
     pub fn has(&self, token: &Token) -> bool {
         token.0.load(Ordering::Relaxed) || Arc::ptr_eq(&token.0, &self.token.0)
     }
 
-    /// Stands for what is recorded now.
+    /// Token of the current recording.
     pub fn token(&self) -> Token {
         self.token.clone()
     }
 
-    /// Runs a kernel over a grid of invocations, with variables beside those of the scope.
+    /// Dispatches a kernel over a grid of invocations, with bindings in addition to those of the scope.
     pub fn dispatch(&mut self, name: Name, bindings: Bindings, extent: [u32; 3]) {
         self.dispatch_kernel(Which::Named(name, self.specialization.clone()), bindings, extent);
     }
 
-    /// The same with any kernel.
+    /// Dispatches any kernel over a grid of invocations.
     pub fn dispatch_kernel(&mut self, which: Which, bindings: Bindings, extent: [u32; 3]) {
         let Some(condition) = self.condition.clone() else { return self.push(which, bindings, Extent::Grid(extent)) };
         let [x, y] = [extent[0], extent[1]].map(|along| along.div_ceil(GRID_GROUP));
         let argument = self.arguments;
         self.arguments += 1;
         let arrangement = Binding::block(&[x, y, 0, 0]);
-        let ours = vec![
+        let own = vec![
             ("arrangement", arrangement),
             ("list_count", (&condition).into()),
             ("arguments", Binding::Arguments(argument..argument + 1)),
         ];
-        self.push(Which::Named(("arrange", "arrange_grid"), Arc::default()), ours, Extent::Grid([1; 3]));
+        self.push(Which::Named(("arrange", "arrange_grid"), Arc::default()), own, Extent::Grid([1; 3]));
         self.push(which, bindings, Extent::Indirect(argument, 0.0));
     }
 
-    /// Runs a kernel over `rows` rows of `width` invocations, in slices where it may take long, each with the uniform block
-    /// that `block` makes for it, by name.
+    /// Dispatches a kernel over `rows` rows of `width` invocations, time-sliced by rows. `block` makes the uniform
+    /// block of each slice, with its name.
     pub fn dispatch_rows(
         &mut self,
         name: Name,
@@ -194,7 +196,7 @@ impl<'a> Recorder<'a> {
         // Whole workgroups.
         let group = u64::from(GRID_GROUP);
         let most = self.gpu.most_invocations(name.1, SLICE_SECONDS) / u64::from(width) / group * group;
-        let most = most.clamp(group, u64::from(MOST_GROUPS)) as u32;
+        let most = most.clamp(group, u64::from(MAX_GROUPS)) as u32;
         for first in (0..rows).step_by(most as usize) {
             let slice = first..(first + most).min(rows);
             let size = [width, slice.len() as u32, 1];
@@ -202,9 +204,9 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// Runs a kernel over the entries of a list, as many as there will be, in slices where it may take long. The list is empty
-    /// afterwards. `block` makes a uniform block, by name, for the number of the first invocation; `listed` holds the
-    /// number of all.
+    /// Dispatches a kernel indirectly over the entries of a list, time-sliced, and clears the list. `block` makes the
+    /// uniform block of each slice, with its name, from the index of the first invocation. `listed` holds the number of
+    /// all invocations.
     pub fn dispatch_list(
         &mut self,
         name: Name,
@@ -214,31 +216,32 @@ impl<'a> Recorder<'a> {
     ) {
         let invocations = list.most * list.each;
         let most = self.gpu.most_invocations(name.1, SLICE_SECONDS) / u64::from(LIST_GROUP) * u64::from(LIST_GROUP);
-        let most = most.clamp(LIST_GROUP.into(), (LIST_GROUP * MOST_GROUPS).into()) as u32;
+        let most = most.clamp(LIST_GROUP.into(), (LIST_GROUP * MAX_GROUPS).into()) as u32;
         let slices = invocations.div_ceil(most);
         let first = self.arguments;
         self.arguments += slices;
         let arrangement = Binding::block(&[slices, most, list.each, 0]);
-        let ours = vec![
+        let own = vec![
             ("arrangement", arrangement),
             ("list_count", list.count.into()),
             ("arguments", Binding::Arguments(first..self.arguments)),
         ];
         let arrange = Which::Named(("arrange", "arrange_list"), Arc::default());
-        self.push(arrange, ours, Extent::Grid([slices, 1, 1]));
+        self.push(arrange, own, Extent::Grid([slices, 1, 1]));
         self.clear(list.count);
         for slice in 0..slices {
             let argument = first + slice;
-            let ours = [block(slice * most), ("listed", Binding::Arguments(argument..argument + 1))];
+            let own = [block(slice * most), ("listed", Binding::Arguments(argument..argument + 1))];
             let which = Which::Named(name, self.specialization.clone());
-            // Under a condition it is as a rule empty.
+            // A conditional list is typically empty.
             let likely = if self.condition.is_some() { 0.0 } else { list.likely * f64::from(invocations) };
             let likely = (likely - f64::from(slice * most)).clamp(0.0, most.into());
-            self.push(which, [&ours, bindings.as_slice()].concat(), Extent::Indirect(argument, likely));
+            self.push(which, [&own, bindings.as_slice()].concat(), Extent::Indirect(argument, likely));
         }
     }
 
-    /// Records what `record` does for the case that `condition` is not 0 then: its grids are dispatched only if so.
+    /// Records work under a condition: its grids are dispatched only if the value of `condition` is not 0 on the
+    /// device.
     pub fn when(&mut self, condition: &wgpu::Buffer, record: impl FnOnce(&mut Self)) {
         let outer = self.condition.replace(condition.clone());
         record(self);
@@ -246,16 +249,16 @@ impl<'a> Recorder<'a> {
     }
 
     fn push(&mut self, which: Which, bindings: Bindings, extent: Extent) {
-        // What the dispatch has of its own comes first.
+        // Bindings of the dispatch take precedence over the scope.
         let bindings = [bindings, self.scope.clone()].concat();
         self.steps.push(Step::Dispatch { which, bindings, extent });
     }
 
-    /// Records what `record` does only to compile its kernels: the next picture finds them.
+    /// Records work that is not run: only its kernels are compiled, ahead of the next picture.
     pub fn compile_ahead(&mut self, record: impl FnOnce(&mut Self)) {
         let (steps, arguments) = (mem::take(&mut self.steps), self.arguments);
         record(self);
-        self.ahead.extend(wanted(&self.steps));
+        self.ahead.extend(pipeline_requests(&self.steps));
         (self.steps, self.arguments) = (steps, arguments);
     }
 
@@ -264,12 +267,12 @@ impl<'a> Recorder<'a> {
         self.steps.push(Step::Clear(buffer.clone()));
     }
 
-    /// Fills a mip of a texture from a buffer, whose rows are padded to whole 256 bytes.
+    /// Copies a buffer to a mip of a texture. The rows in the buffer are padded to multiples of 256 bytes.
     pub fn fill(&mut self, texture: &wgpu::Texture, mip: u32, buffer: &wgpu::Buffer) {
         self.steps.push(Step::Fill { texture: texture.clone(), mip, buffer: buffer.clone() });
     }
 
-    /// Brings `bytes` of a buffer back; [`Recorder::submit`] returns them in the order of the calls.
+    /// Records a readback of `bytes` bytes of a buffer; [`Recorder::submit`] returns the readbacks in order.
     pub fn download(&mut self, buffer: &wgpu::Buffer, offset: u64, bytes: u64) {
         if buffer.usage().contains(wgpu::BufferUsages::MAP_READ) {
             self.downloads.push(Download::of(buffer.clone(), offset..offset + bytes));
@@ -280,7 +283,7 @@ impl<'a> Recorder<'a> {
         self.downloads.push(Download::of(staging, 0..bytes));
     }
 
-    /// The same for a texture of half floats and its mips, whose rows are padded.
+    /// Records a readback of a texture and its mips, with padded rows.
     pub fn download_texture(&mut self, texture: &wgpu::Texture) {
         let bytes = texture_bytes(texture, COPIED);
         let staging = self.gpu.staging(bytes);
@@ -288,17 +291,17 @@ impl<'a> Recorder<'a> {
         self.downloads.push(Download::of(staging, 0..bytes));
     }
 
-    /// Hands the last download to `received` when it is there; it is not among those that are returned.
+    /// Passes the last readback to `received` after completion instead of returning it.
     pub fn receive(&mut self, received: impl FnOnce(&[u8]) + 'static) {
         self.received.push((self.downloads.len() - 1, Box::new(received)));
     }
 
-    /// Runs everything, waits for it and returns the downloads.
+    /// Runs the recording, waits for it and returns the readbacks.
     pub fn submit(mut self) -> Result<Vec<Download>> {
         self.flush()
     }
 
-    /// The same, and goes on recording.
+    /// Runs the recording as [`Recorder::submit`]; further work can be recorded.
     pub fn flush(&mut self) -> Result<Vec<Download>> {
         (self.interrupt)()?;
         let steps = mem::take(&mut self.steps);
@@ -306,11 +309,11 @@ impl<'a> Recorder<'a> {
         let mut downloads = mem::take(&mut self.downloads);
         let arguments = mem::take(&mut self.arguments);
         let mut submission = Submission::new(self.gpu, &steps, arguments, self.interrupt);
-        let wanted = wanted(&steps).into_iter().chain(mem::take(&mut self.ahead));
-        compiling(self.gpu, wanted, || steps.iter().try_for_each(|step| submission.encode(step)))?;
+        let wanted = pipeline_requests(&steps).into_iter().chain(mem::take(&mut self.ahead));
+        while_compiling(self.gpu, wanted, || steps.iter().try_for_each(|step| submission.encode(step)))?;
         submission.finish(&mut downloads, self.timings)?;
         token.0.store(true, Ordering::Relaxed);
-        // From the last to the first, so that those before keep their places.
+        // From the last to the first, so that indices stay valid.
         let received = mem::take(&mut self.received).into_iter().rev();
         let arrived: Vec<_> = received.map(|(index, received)| (downloads.remove(index), received)).collect();
         arrived.into_iter().rev().for_each(|(download, received)| received(download.numbers()));
@@ -318,8 +321,8 @@ impl<'a> Recorder<'a> {
     }
 }
 
-/// The kernels that steps name.
-fn wanted(steps: &[Step]) -> Vec<Wanted> {
+/// Kernels that steps name.
+fn pipeline_requests(steps: &[Step]) -> Vec<PipelineRequest> {
     let named = |step: &Step| match step {
         Step::Dispatch { which: Which::Named(name, specialization), .. } => Some((*name, specialization.clone())),
         _ => None,
@@ -327,17 +330,21 @@ fn wanted(steps: &[Step]) -> Vec<Wanted> {
     steps.iter().filter_map(named).collect()
 }
 
-/// Does `work` while kernels are compiled on other threads.
-fn compiling<T>(gpu: &Gpu, wanted: impl Iterator<Item = Wanted>, work: impl FnOnce() -> Result<T>) -> Result<T> {
-    let mut missing: Vec<Wanted> = Vec::new();
+/// Runs `work` while other threads compile kernels.
+fn while_compiling<T>(
+    gpu: &Gpu,
+    wanted: impl Iterator<Item = PipelineRequest>,
+    work: impl FnOnce() -> Result<T>,
+) -> Result<T> {
+    let mut missing: Vec<PipelineRequest> = Vec::new();
     for (name, specialization) in wanted {
-        let same = |(known, table): &Wanted| *known == name && *table == specialization;
+        let same = |(requested, table): &PipelineRequest| *requested == name && *table == specialization;
         if !missing.iter().any(same) && !gpu.is_compiled(name, &specialization)? {
             missing.push((name, specialization));
         }
     }
-    // No more threads than run at once: each keeps memory of its own for what it has compiled (glibc's arenas), 669 MB for 60
-    // random skies with a thread for each kernel and 350 MB with one arena.
+    // One thread per core at most: each thread has a memory arena of its own in glibc. For 60 random skies they take
+    // 669 MB with a thread per kernel, and 350 MB with one arena.
     let threads = thread::available_parallelism().map_or(1, NonZero::get).min(missing.len());
     let missing = Mutex::new(missing.into_iter());
     let compile = || {
@@ -357,20 +364,20 @@ fn compiling<T>(gpu: &Gpu, wanted: impl Iterator<Item = Wanted>, work: impl FnOn
     })
 }
 
-/// Steps on their way to the device.
+/// Encoding and submission of recorded steps.
 struct Submission<'a> {
     gpu: &'a Gpu,
     interrupt: Interrupt<'a>,
-    /// Uniform blocks, and where each begins.
+    /// Uniform blocks, and the offset of each in bytes.
     blocks: wgpu::Buffer,
     offsets: HashMap<*const u32, u64>,
     arguments: wgpu::Buffer,
     encoder: wgpu::CommandEncoder,
-    /// How long what has been encoded since the last submission may take, s.
+    /// Estimated time of the commands encoded since the last submission, s.
     seconds: f64,
     in_flight: Option<wgpu::SubmissionIndex>,
     queries: Option<wgpu::QuerySet>,
-    /// What was dispatched: the kernel, and over what.
+    /// Kernel and size of each dispatch.
     dispatched: Vec<(Arc<Kernel>, Extent)>,
     started: Instant,
 }
@@ -386,7 +393,7 @@ impl<'a> Submission<'a> {
             for (_, binding) in bindings {
                 if let Binding::Block(words) = binding {
                     offsets.entry(words.as_ptr()).or_insert_with(|| {
-                        bytes.resize(bytes.len().next_multiple_of(ALIGNED), 0);
+                        bytes.resize(bytes.len().next_multiple_of(UNIFORM_ALIGNMENT), 0);
                         let begin = bytes.len() as u64;
                         bytes.extend_from_slice(bytemuck::cast_slice(words));
                         begin
@@ -394,9 +401,9 @@ impl<'a> Submission<'a> {
                 }
             }
         }
-        let blocks = gpu.uniform("blocks", bytes.len().next_multiple_of(ALIGNED).max(ALIGNED));
+        let blocks = gpu.uniform("blocks", bytes.len().next_multiple_of(UNIFORM_ALIGNMENT).max(UNIFORM_ALIGNMENT));
         gpu.queue.write_buffer(&blocks, 0, &bytes);
-        let timed = 2 * dispatches.min(MOST_TIMED) as u32;
+        let timed = 2 * dispatches.min(MAX_TIMED) as u32;
         let queries = gpu.nanoseconds_per_tick.filter(|_| timed > 0).map(|_| {
             gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
                 label: Some("timestamps"),
@@ -445,20 +452,20 @@ impl<'a> Submission<'a> {
         let kernel = match which {
             Which::Made(kernel) => kernel.clone(),
             Which::Named(name, specialization) => {
-                // The device may do what it has until the kernel is there.
+                // The device runs the encoded commands while the kernel is compiled.
                 if !self.gpu.is_compiled(*name, specialization)? {
                     self.submit();
                 }
                 self.gpu.kernel(*name, specialization)?
             }
         };
-        let seconds = extent.likely() * self.gpu.seconds_each(&kernel.label);
+        let seconds = extent.expected() * self.gpu.seconds_each(&kernel.label);
         if self.seconds > 0.0 && self.seconds + seconds > SLICE_SECONDS {
-            // Lavapipe has done what it is handed before it takes it (Mesa 22.3): no wait there is so long that it asks.
+            // lavapipe executes submissions synchronously (Mesa 22.3): waits end before they call the interrupt check.
             (self.interrupt)()?;
             let before = self.in_flight.take();
             self.submit();
-            // So that no more than two slices are on their way, of which an interrupt ends the second only.
+            // At most two slices are in flight; an interrupt prevents only those after them.
             before.map_or(Ok(()), |index| self.gpu.wait(index, self.interrupt))?;
         }
         self.seconds += seconds;
@@ -471,7 +478,7 @@ impl<'a> Submission<'a> {
         };
         let group = kernel.bind(self.gpu, bindings, &resources)?;
         let number = self.dispatched.len();
-        let queries = self.queries.as_ref().filter(|_| number < MOST_TIMED);
+        let queries = self.queries.as_ref().filter(|_| number < MAX_TIMED);
         let timestamp_writes = queries.map(|query_set| wgpu::ComputePassTimestampWrites {
             query_set,
             beginning_of_pass_write_index: Some(2 * number as u32),
@@ -495,22 +502,22 @@ impl<'a> Submission<'a> {
         Ok(())
     }
 
-    /// Hands over what has been encoded.
+    /// Submits the encoded commands.
     fn submit(&mut self) {
         let encoded = mem::replace(&mut self.encoder, encoder(self.gpu));
         self.in_flight = Some(self.gpu.submit(encoded));
         self.seconds = 0.0;
     }
 
-    /// Waits for everything, and opens what is brought back.
+    /// Waits for all submissions and opens the readbacks.
     fn finish(mut self, downloads: &mut [Download], timings: &mut Timings) -> Result<()> {
         let gpu = self.gpu;
-        let mut ours = Vec::new();
-        let timed = self.dispatched.len().min(MOST_TIMED) as u64;
+        let mut own = Vec::new();
+        let timed = self.dispatched.len().min(MAX_TIMED) as u64;
         let mut bring = |encoder: &mut wgpu::CommandEncoder, buffer: &wgpu::Buffer| {
             let staging = gpu.staging(buffer.size());
             encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, buffer.size());
-            ours.push(Download::of(staging, 0..buffer.size()));
+            own.push(Download::of(staging, 0..buffer.size()));
         };
         bring(&mut self.encoder, &self.arguments);
         if let Some(queries) = self.queries.as_ref().filter(|_| timed > 0) {
@@ -519,17 +526,17 @@ impl<'a> Submission<'a> {
             bring(&mut self.encoder, &resolved);
         }
         self.submit();
-        downloads.iter_mut().chain(&mut ours).for_each(Download::map);
+        downloads.iter_mut().chain(&mut own).for_each(Download::map);
         let last = self.in_flight.take().expect("was just submitted");
         gpu.wait(last, self.interrupt)?;
-        downloads.iter_mut().chain(&mut ours).try_for_each(Download::open)?;
-        self.learn(&ours, timings);
+        downloads.iter_mut().chain(&mut own).try_for_each(Download::open)?;
+        self.learn(&own, timings);
         Ok(())
     }
 
-    /// Learns how long kernels take.
-    fn learn(&self, ours: &[Download], timings: &mut Timings) {
-        let arguments: &[u32] = ours[0].numbers();
+    /// Updates the estimated costs of kernels.
+    fn learn(&self, own: &[Download], timings: &mut Timings) {
+        let arguments: &[u32] = own[0].numbers();
         let invocations = |extent: Extent| match extent {
             Extent::Grid(size) => size.map(f64::from).iter().product::<f64>(),
             Extent::Indirect(argument, _) => {
@@ -538,12 +545,12 @@ impl<'a> Submission<'a> {
                 groups * f64::from(LIST_GROUP)
             }
         };
-        let Some((ticks, period)) = ours.get(1).zip(self.gpu.nanoseconds_per_tick) else {
-            // Without timestamps all are as much slower or faster than thought.
+        let Some((ticks, period)) = own.get(1).zip(self.gpu.nanoseconds_per_tick) else {
+            // Without timestamps the measured time is distributed in proportion to the estimates.
             let each =
                 |(kernel, extent): &(Arc<Kernel>, Extent)| invocations(*extent) * self.gpu.seconds_each(&kernel.label);
-            let thought: f64 = self.dispatched.iter().map(each).sum();
-            let ratio = self.started.elapsed().as_secs_f64() / thought.max(1e-9);
+            let estimated: f64 = self.dispatched.iter().map(each).sum();
+            let ratio = self.started.elapsed().as_secs_f64() / estimated.max(1e-9);
             for (kernel, extent) in &self.dispatched {
                 let seconds = ratio * each(&(kernel.clone(), *extent));
                 self.gpu.learn(&kernel.label, invocations(*extent), seconds);
@@ -560,8 +567,8 @@ impl<'a> Submission<'a> {
 }
 
 impl Extent {
-    /// How many invocations it has as a rule.
-    fn likely(self) -> f64 {
+    /// Expected number of invocations.
+    fn expected(self) -> f64 {
         match self {
             Self::Grid(size) => size.map(f64::from).iter().product(),
             Self::Indirect(_, likely) => likely,
@@ -573,32 +580,33 @@ fn encoder(gpu: &Gpu) -> wgpu::CommandEncoder {
     gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("recording") })
 }
 
-/// Seconds that an invocation is thought to take before any has been timed, on a processor and on a GPU: ten times as long as one
-/// of a march in `draft`, as long as one in `high`.
-const FIRST_GUESS: [f64; 2] = [3e-5, 1e-7];
-/// Invocations up to which a dispatch says nothing of how long one takes: launching it takes longer.
-const TOO_FEW: f64 = 1024.0;
+/// Initial estimate of the time of an invocation in s, on a CPU and on a GPU: ten times that of a march in `draft`, and
+/// that of a march in `high`.
+const INITIAL_COST: [f64; 2] = [3e-5, 1e-7];
+/// Invocations below which a dispatch is not used for estimates: launch overhead dominates.
+const MIN_TIMED_INVOCATIONS: f64 = 1024.0;
 
-/// Seconds that an invocation takes, by kernel.
+/// Estimated time of an invocation in s, by kernel.
 #[derive(Default)]
 struct Costs(Mutex<HashMap<String, f64>>);
 
 impl Gpu {
-    /// Seconds that an invocation of a kernel takes.
+    /// Estimated time of an invocation of a kernel in s.
     fn seconds_each(&self, kernel: &str) -> f64 {
-        let [processor, other] = FIRST_GUESS;
+        let [processor, other] = INITIAL_COST;
         let guess = if self.info.kind == "cpu" { processor } else { other };
         lock(&self.common::<Costs>().0).get(kernel).copied().unwrap_or(guess)
     }
 
-    /// How many invocations of a kernel take so many seconds, at least one.
+    /// Number of invocations of a kernel that fit a time in s, at least one.
     fn most_invocations(&self, kernel: &str, seconds: f64) -> u64 {
         ((seconds / self.seconds_each(kernel)) as u64).max(1)
     }
 
-    /// Learns how long invocations of a kernel take: from many, and by no more than a factor of four at once after the first time.
+    /// Updates the estimate for a kernel from a dispatch of many invocations; after the first update by at most a
+    /// factor of four at once.
     fn learn(&self, kernel: &str, invocations: f64, seconds: f64) {
-        if invocations >= TOO_FEW && seconds > 0.0 {
+        if invocations >= MIN_TIMED_INVOCATIONS && seconds > 0.0 {
             let common = self.common::<Costs>();
             let mut costs = lock(&common.0);
             let each = seconds / invocations;

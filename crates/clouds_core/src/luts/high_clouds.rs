@@ -1,4 +1,4 @@
-//! The texture of the high clouds, made again when its shapes have evolved.
+//! Texture of the high clouds, rebaked as its shapes evolve.
 
 use super::lut::{Inputs, Lut, view};
 use crate::error::Result;
@@ -6,10 +6,10 @@ use crate::gpu::COPIED;
 use crate::gpu::Recorder;
 use crate::params;
 
-/// What the texture is made from: seed, octaves, stretch, type, size, and the ages and numbers of its updates.
+/// Key of the texture: seed, octaves, stretch, type, size, and the ages and indices of the updates of its octaves.
 type Key = (u32, u32, f32, f32, u32, [[f32; 4]; 4]);
 
-/// The kernel that bakes a type: a pattern that it has nothing of is compiled out.
+/// Kernel that bakes a type; patterns that the type lacks are compiled out.
 fn kernel(high: &params::HighClouds) -> &'static str {
     match high.r#type {
         0.0 => "high_clouds",
@@ -18,7 +18,7 @@ fn kernel(high: &params::HighClouds) -> &'static str {
     }
 }
 
-/// The texture of the high clouds on the GPU.
+/// Texture of the high clouds on the GPU.
 #[derive(Default)]
 pub(crate) struct HighClouds {
     lut: Lut<Key>,
@@ -36,9 +36,9 @@ impl HighClouds {
         let size = high.texture_size;
         let key = (high.seed, high.octaves, high.stretch, high.r#type, size, updates);
         let map = self.lut.update(rec, key, |rec| {
-            // One channel: with four, three of them for nothing, it drops out of the cache of a core (reading it took
-            // composite 24 ms at 1080p on a busy machine, not 16). Such a texture cannot be stored to, so it is filled
-            // from a buffer.
+            // One channel: with three unused channels the texture exceeds the cache of a core (reads in composite took
+            // 24 ms instead of 16 ms at 1080p on a busy machine). Stores to such a texture are not supported, so it is
+            // filled from a buffer.
             let texture = rec.gpu.flat("high_clouds", [size; 2], wgpu::TextureFormat::R16Float);
             let texels = rec.gpu.buffer("high_clouds", u64::from((2 * size).next_multiple_of(COPIED) * size));
             let out = vec![("texels_out", (&texels).into())];

@@ -1,4 +1,4 @@
-//! The larger weather map, which shifts and bends the smaller one: baked from noise, the user's own, or a mixture.
+//! Large-scale weather map, which offsets and distorts the weather map: baked from noise, user-supplied, or a mixture.
 
 use super::lut::{Inputs, Lut, bake_map, load_or_bake, view};
 use super::weather::mix;
@@ -8,10 +8,11 @@ use crate::params::{BroadShares, BroadSource, Edge, Params, Weather};
 use crate::shared::constants;
 
 constants! {
-    /// Texels of the side of a baked larger map: it holds nothing smaller than a twelfth of itself.
+    /// Side of the baked large-scale map in texels: its smallest features are a twelfth of the map.
     const BROAD_SIZE: u32 = 128;
 }
-/// The larger map on the GPU.
+
+/// Large-scale weather map on the GPU.
 #[derive(Default)]
 pub(crate) struct LargeScaleWeather {
     lut: Lut<BroadShares>,
@@ -41,7 +42,7 @@ impl LargeScaleWeather {
     }
 }
 
-/// One map, whose weather may be another than the picture's.
+/// Map of one source; its weather may differ from that of the picture.
 fn bake_source(rec: &mut Recorder<'_>, params: &Params, source: &BroadSource) -> Result<wgpu::Texture> {
     match source {
         BroadSource::Own(map) => {

@@ -1,4 +1,4 @@
-//! The shadows of clouds on the air of a picture: crepuscular rays.
+//! Shadows of clouds on the air of a picture: light shafts (crepuscular rays).
 
 use glam::DVec2;
 
@@ -10,31 +10,31 @@ use crate::frame::Frame;
 use crate::gpu::Recorder;
 use crate::params;
 
-/// Angle between rays in the middle of the picture, radians, most of them along a side (393 go around a panorama), and slices
-/// of their distance.
+/// Angle in radians between rays at the centre of the picture, maximum number of rays along a side (a panorama has
+/// 393), and number of slices in distance.
 const ANGLE: f32 = 0.016;
-const MOST: u32 = 400;
+const MAX_RAYS: u32 = 400;
 const SLICES: u32 = 32;
 
-/// Eye and shadows may move so far while the volume stays, m: a quarter of a texel of the shadows. What the air lacks is seen
-/// from the middle of such a step, so that it follows from the picture alone, not from those before.
+/// Motion in m of eye and shadows within which the volume is reused: a quarter of a texel of the shadows. The volume is
+/// baked for the centre of such a cell, so that it depends on the picture alone, not on earlier ones.
 const STEP: f64 = 16.0;
 
-/// What the volume is made from: its size, the camera's axes, its fields of view and the sky's scale, sun, air and shadows, from
-/// where, and where those are.
+/// Key of the volume: size, camera axes, fields of view and sky scale, sun, atmosphere, shadows, snapped position of
+/// the eye, and its position in the shadow clipmap.
 type Key = ([u32; 3], [[f32; 3]; 3], [f32; 3], params::Sun, params::Atmosphere, shadow::Key, [f64; 3], [f64; 2]);
 
-/// The volume on the GPU.
+/// Light-shaft volume on the GPU.
 #[derive(Default)]
 pub(crate) struct LightShafts {
     lut: Lut<Key>,
 }
 
-/// Texels for a picture.
+/// Size of the volume for a picture, in texels.
 fn size(frame: &Frame) -> [u32; 3] {
     let pixel = frame.marched_angle() / frame.dispatch.stride as f32;
-    // At least a pixel apart.
-    let along = |pixels: u32| (pixels.min((pixels as f32 * pixel / ANGLE) as u32) + 1).clamp(2, MOST);
+    // At least one pixel between rays.
+    let along = |pixels: u32| (pixels.min((pixels as f32 * pixel / ANGLE) as u32) + 1).clamp(2, MAX_RAYS);
     [along(frame.view.width), along(frame.view.height), SLICES]
 }
 

@@ -1,4 +1,4 @@
-//! One look-up table: remade when its key changes.
+//! Look-up table that is rebaked when its key changes.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -12,21 +12,22 @@ use crate::gpu::{
     Binding, Linked, Name, Recorder, Specialization, Token, disk_cache as cache, texture_bytes, texture_rows,
 };
 use crate::params::{self, Params, Quality};
-/// What a picture is made from: all that a LUT or a pass may depend on.
+
+/// Inputs of a picture: everything that a LUT or a pass may depend on.
 pub(crate) struct Inputs<'a> {
     pub params: &'a Params,
     pub quality: &'a Quality,
     pub frame: &'a Frame,
     pub eye: DVec3,
     pub time: f64,
-    /// What its kernels are compiled for.
+    /// Specialization table of the kernels of the picture.
     pub specialization: Arc<Specialization>,
 }
 
-/// Maps that a kernel adds up, by name.
+/// Names of the maps that a mixing kernel adds up.
 pub(super) const MIXED: [&str; 4] = ["mix_a", "mix_b", "mix_c", "mix_d"];
 
-/// One LUT: what was made, from what, and whether it has been submitted.
+/// LUT with its key, and the token of the recording that bakes it.
 pub(crate) struct Lut<K, T = wgpu::TextureView> {
     made: Option<(K, T, Token)>,
 }
@@ -38,14 +39,14 @@ impl<K, T> Default for Lut<K, T> {
 }
 
 impl<K: PartialEq, T: Clone> Lut<K, T> {
-    /// What it is for a key, baked if that is another than before.
+    /// The LUT for a key, rebaked if the key has changed or the recording was never submitted.
     pub fn update<'a>(
         &mut self,
         rec: &mut Recorder<'a>,
         key: K,
         bake: impl FnOnce(&mut Recorder<'a>) -> Result<T>,
     ) -> Result<T> {
-        if let Some((_, made, _)) = self.made.as_ref().filter(|(known, _, token)| *known == key && rec.has(token)) {
+        if let Some((_, made, _)) = self.made.as_ref().filter(|(old, _, token)| *old == key && rec.has(token)) {
             return Ok(made.clone());
         }
         self.made = None;
@@ -55,7 +56,7 @@ impl<K: PartialEq, T: Clone> Lut<K, T> {
     }
 }
 
-/// The uniform block of parameters.
+/// Uniform block of the parameters.
 pub(crate) fn params_block(params: &Params, quality: &Quality) -> Binding {
     Binding::block(&params::uniform(params, quality))
 }
@@ -64,17 +65,17 @@ pub(crate) fn view(texture: &wgpu::Texture) -> wgpu::TextureView {
     texture.create_view(&wgpu::TextureViewDescriptor::default())
 }
 
-/// Fills a flat texture with a kernel.
+/// Bakes a 2D texture with a kernel.
 pub(super) fn bake_map(rec: &mut Recorder<'_>, name: Name, params: Option<&Params>, texture: &wgpu::Texture) {
     let mut bindings = vec![("map_out", (&view(texture)).into())];
     bindings.extend(params.map(|params| ("params", params_block(params, &Quality::default()))));
     rec.dispatch(name, bindings, [texture.width(), texture.height(), 1]);
 }
 
-/// Fills textures with what an earlier process has baked for `key`, or by `bake`, a kernel of `pass`, for the next process to
-/// find among its files of this `kind`.
+/// Loads textures from the disk cache for `key`, or bakes them with `bake`, a kernel of `pass`, and stores them as
+/// files of this `kind`.
 ///
-/// Only where the CPU bakes: a GPU needs a few milliseconds, which is less than reading the file takes.
+/// On a CPU device alone: a GPU bakes within a few milliseconds, less than reading the file takes.
 pub(super) fn load_or_bake<'a>(
     rec: &mut Recorder<'a>,
     pass: &str,
@@ -90,7 +91,7 @@ pub(super) fn load_or_bake<'a>(
     }
     let shader = Linked::new(&format!("passes/{pass}"), gpu.generated).map_err(Error::Device)?.code;
     let bytes: Vec<_> = textures.iter().map(|texture| texture_bytes(texture, 1) as usize).collect();
-    // Drivers differ in how they round.
+    // Drivers round differently.
     let key = format!("{} {}\n{key}\n{bytes:?}\n{shader}", gpu.info.name, gpu.info.driver);
     if let Some(stored) = cache::load(kind, &key).filter(|stored| stored.len() == bytes.iter().sum()) {
         let mut rest = stored.as_slice();

@@ -1,4 +1,4 @@
-//! What the density nearby never exceeds, for delta tracking: baked when paths are traced.
+//! Majorants of the density for delta tracking, baked for path tracing.
 
 use super::lut::{Inputs, Lut, view};
 use super::volume::Grid;
@@ -9,19 +9,21 @@ use crate::params::{self, BroadShares, Edge, Model};
 use crate::shared::constants;
 
 constants! {
-    /// Voxels of the user's grid along the side of a cell.
+    /// Side of a majorant cell in voxels of the user's grid.
     const BRICK: usize = 4;
 }
-/// Most cells along a side of the weather map, and their height between the lowest and the highest clouds, m.
-const CELLS: u32 = 64;
-const CELL_HEIGHT: f32 = 125.0;
-/// Texels of the weather map's side for each cell.
-const TEXELS: u32 = 8;
 
-/// What the majorants are made from: the grid, or weather and cover.
+/// Maximum number of cells along a side of the weather map, and the height of a cell in m between the lowest and the
+/// highest clouds.
+const MAX_CELLS: u32 = 64;
+const CELL_HEIGHT: f32 = 125.0;
+/// Side of a majorant cell in texels of the weather map.
+const CELL_TEXELS: u32 = 8;
+
+/// Key of the majorants: grid, or weather and decks.
 type Key = (Grid, (Vec<(params::Weather, f32)>, Edge, BroadShares), params::Clouds, params::UpperClouds);
 
-/// The majorants on the GPU.
+/// Majorants on the GPU.
 #[derive(Default)]
 pub(crate) struct Majorants {
     lut: Lut<Key>,
@@ -40,7 +42,7 @@ impl Majorants {
             let (entry, size) = match &params.volume {
                 Some(grid) => ("majorant_grid", grid.size().map(|n| n.div_ceil(BRICK) as u32)),
                 None => {
-                    let across = weather::size(params).map(|n| n.div_ceil(TEXELS).clamp(1, CELLS));
+                    let across = weather::size(params).map(|n| n.div_ceil(CELL_TEXELS).clamp(1, MAX_CELLS));
                     let [base, top] = params.shell();
                     let up = (((top - base) / CELL_HEIGHT) as u32).clamp(16, 64);
                     ("majorant_weather", [across[0], across[1], up])

@@ -1,5 +1,5 @@
-//! What a march reads: look-up tables on the device, one module for each with the WGSL file of the same name under `passes/`.
-//! Each is baked when what it is made from changes.
+//! Look-up tables and textures that a march reads. Each has a module here and a WGSL file of the same name under
+//! `passes/`, and is rebaked when its key changes.
 
 pub mod high_clouds;
 pub mod large_scale_weather;
@@ -26,7 +26,7 @@ use crate::specialization;
 pub(crate) use lut::Inputs;
 use lut::{params_block, view};
 
-/// Everything that a march can read.
+/// All LUTs of a renderer.
 pub(crate) struct Luts {
     blue_noise: wgpu::TextureView,
     noise: noise::Noises,
@@ -68,28 +68,28 @@ impl Luts {
         }
     }
 
-    /// Binds the uniform blocks and the LUTs of a picture, after baking what has changed.
+    /// Rebakes the LUTs whose keys have changed, and binds them with the uniform blocks of a picture.
     pub fn update(&mut self, rec: &mut Recorder<'_>, inputs: &Inputs<'_>) -> Result<()> {
         rec.bind([("params", params_block(inputs.params, inputs.quality)), ("blue_noise", (&self.blue_noise).into())]);
         rec.bind(inputs.frame.bindings(rec.gpu));
         rec.specialize(specialization::of_bakes());
-        self.noise.update(rec, inputs)?; // once for a seed and a finer detail
-        self.weather.update(rec, inputs)?; // when its block or the mixture changes
-        self.large_scale_weather.update(rec, inputs)?; // when the larger map or its shares change
-        self.profile.update(rec, inputs)?; // once for a table
-        self.phase.update(rec, inputs)?; // once for a droplet
-        self.high_clouds.update(rec, inputs)?; // as they evolve
-        self.transmittance.update(rec, inputs)?; // when the air changes
-        self.multiscatter.update(rec, inputs)?; // when the air or the ground change
-        self.sky.update(rec, inputs)?; // when sun or air change, or the eye has gone far
-        rec.specialize(inputs.specialization.clone()); // those so far know no picture
-        self.volume.update(rec, inputs)?; // once for a grid
-        self.majorants.update(rec, inputs)?; // when paths are traced
-        self.ground_shadow.update(rec, inputs)?; // as clouds and eye move, where it is seen
-        self.light_shafts.update(rec, inputs) // as those and the view, where they shade air
+        self.noise.update(rec, inputs)?; // on a new seed or weight of finer detail
+        self.weather.update(rec, inputs)?; // on a new weather or mixture
+        self.large_scale_weather.update(rec, inputs)?; // on a new large-scale map or weights
+        self.profile.update(rec, inputs)?; // on a new table
+        self.phase.update(rec, inputs)?; // on a new droplet diameter
+        self.high_clouds.update(rec, inputs)?; // as its octaves evolve
+        self.transmittance.update(rec, inputs)?; // on a new atmosphere
+        self.multiscatter.update(rec, inputs)?; // on a new atmosphere or ground
+        self.sky.update(rec, inputs)?; // on a new sun or atmosphere, or a step of the eye
+        rec.specialize(inputs.specialization.clone()); // the bakes above are specialized for no picture
+        self.volume.update(rec, inputs)?; // on a new grid
+        self.majorants.update(rec, inputs)?; // for path tracing
+        self.ground_shadow.update(rec, inputs)?; // on a step of clouds or eye, if the shadows are visible
+        self.light_shafts.update(rec, inputs) // on a step of clouds or eye or a new view, if clouds shade visible air
     }
 
-    /// The weather map alone.
+    /// Weather map without the other LUTs.
     pub fn weather_map(&mut self, rec: &mut Recorder<'_>, params: &Params, frame: &Frame) -> Result<wgpu::Texture> {
         rec.bind([("params", params_block(params, &Quality::default()))]);
         rec.bind(frame.bindings(rec.gpu));

@@ -1,4 +1,4 @@
-//! The light that air and ground have scattered, by altitude and the height of the sun.
+//! Multiscattering LUT: light scattered by air and ground, order by order, by altitude and elevation of the sun.
 
 use super::lut::{Inputs, Lut, MIXED, load_or_bake, view};
 use super::transmittance;
@@ -9,18 +9,18 @@ use crate::params;
 use crate::shared::constants;
 
 constants! {
-    /// Tables of the light that has been scattered, one below the other (`SCATTERED` to `FLUX_SUNWARD`).
+    /// Number of tables of scattered light, stacked vertically (`SCATTERED` to `FLUX_SUNWARD`).
     const TABLES: u32 = 6;
-    /// Texels across one of these tables: the cosine of the sun's angle with the zenith.
+    /// Width of a table in texels: cosine of the sun's zenith angle.
     const TABLE_COSINES: u32 = 64;
-    /// Texels down one of these tables: altitude.
+    /// Height of a table in texels: altitude.
     const TABLE_ALTITUDES: u32 = 24;
 }
 
 /// Texels of all tables.
 const SIZE: [u32; 3] = [TABLE_COSINES, TABLES * TABLE_ALTITUDES, 1];
 
-/// The tables on the GPU.
+/// Multiscattering LUT on the GPU.
 #[derive(Default)]
 pub(crate) struct Multiscatter {
     lut: Lut<params::Atmosphere>,
@@ -41,13 +41,13 @@ impl Multiscatter {
 }
 
 fn bake(rec: &mut Recorder<'_>, sum: &wgpu::Texture) {
-    // Of as many orders as are added up; the last stands for all that follow.
-    let orders = MIXED.map(|_| view(&rec.gpu.texture("air_light_order", SIZE, 1)));
+    // One texture per order of scattering; the last order stands for all further ones.
+    let orders = MIXED.map(|_| view(&rec.gpu.texture("multiscattering_order", SIZE, 1)));
     let table = [TABLE_COSINES, TABLE_ALTITUDES, 1];
     let next = |before: &wgpu::TextureView, out: &wgpu::TextureView| -> Bindings {
         vec![("mix_a", before.into()), ("map_out", out.into())]
     };
-    // The first has none before it, but one kernel body with the others: what is bound is not read.
+    // The first order has no predecessor. It shares the kernel body of the others, so its input is bound and not read.
     rec.dispatch(("multiscatter", "first_order"), next(&orders[1], &orders[0]), table);
     for (before, out) in orders.iter().zip(&orders[1..]) {
         rec.dispatch(("multiscatter", "next_order"), next(before, out), table);

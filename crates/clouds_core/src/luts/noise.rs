@@ -1,4 +1,4 @@
-//! The three noise textures of nubis2015, baked once for a seed and shared by all renderers on a device.
+//! Noise textures of nubis2015 (base shape, detail, curl), baked once per seed and shared by all renderers on a device.
 
 use std::sync::{Arc, Mutex};
 
@@ -11,52 +11,52 @@ use crate::params;
 use crate::shared::constants;
 
 constants! {
-    /// Texels of the base shape's side (nubis2015).
+    /// Side of the base-shape noise in texels (nubis2015).
     const SHAPE_SIZE: u32 = 128;
-    /// Texels of the detail's side (nubis2015).
+    /// Side of the detail noise in texels (nubis2015).
     const DETAIL_SIZE: u32 = 32;
-    /// How many times smaller than the detail the finer one is that is added to it: a whole number, so that its tiles
-    /// fill that of the detail.
+    /// Ratio of the tile of the detail noise to that of the finer detail noise added to it. It is an integer, so that
+    /// the finer tiles fill the tile of the detail.
     const FINER: u32 = 5;
-    /// Texels of the curl noise's side (nubis2015).
+    /// Side of the curl noise in texels (nubis2015).
     const CURL_SIZE: u32 = 128;
 }
 
-/// The noises of a renderer.
+/// Noise textures of a renderer.
 #[derive(Default)]
 pub(crate) struct Noises {
     own: Option<Arc<Noise>>,
 }
 
-/// The last noise of a device: renderers of the same seed share it.
+/// Latest noise textures of a device: renderers of the same seed share them.
 type Shared = Mutex<Option<Arc<Noise>>>;
 
-/// The baked textures.
+/// Baked noise textures.
 struct Noise {
     key: (u32, params::Noise),
     finer: f32,
     shape: wgpu::TextureView,
-    /// The detail alone.
+    /// Detail noise without finer detail.
     coarse: wgpu::Texture,
-    /// The same with the finer one.
+    /// Detail noise with finer detail.
     detail: wgpu::TextureView,
     curl: wgpu::TextureView,
     token: Token,
 }
 
 impl Noises {
-    /// The noise for these parameters: the renderer's own or the last one baked if they fit, else a new one.
+    /// Binds the noise of the parameters: that of this renderer, or the latest of the device, or a new one.
     pub fn update(&mut self, rec: &mut Recorder<'_>, inputs: &Inputs<'_>) -> Result<()> {
         let clouds = &inputs.params.clouds;
         let key = (clouds.seed, clouds.noise);
         let shared = rec.gpu.common::<Shared>();
         let mut shared = lock(&shared);
-        let there = |noise: &Arc<Noise>| noise.key == key && rec.has(&noise.token);
-        let known: Vec<_> = self.own.clone().into_iter().chain(shared.clone()).filter(there).collect();
-        let noise = match known.iter().find(|noise| noise.finer == clouds.fine_detail) {
+        let matches_key = |noise: &Arc<Noise>| noise.key == key && rec.has(&noise.token);
+        let baked: Vec<_> = self.own.clone().into_iter().chain(shared.clone()).filter(matches_key).collect();
+        let noise = match baked.iter().find(|noise| noise.finer == clouds.fine_detail) {
             Some(noise) => noise.clone(),
             None => {
-                let noise = Arc::new(Noise::new(rec, key, clouds.fine_detail, known.first().map(|noise| &**noise))?);
+                let noise = Arc::new(Noise::new(rec, key, clouds.fine_detail, baked.first().map(|noise| &**noise))?);
                 *shared = Some(noise.clone());
                 noise
             }
@@ -72,7 +72,7 @@ impl Noises {
 }
 
 impl Noise {
-    /// New ones, or what is new beside another of the same seed.
+    /// Bakes noise textures; those that match are taken from `other`, which has the same seed.
     fn new(rec: &mut Recorder<'_>, key: (u32, params::Noise), finer: f32, other: Option<&Self>) -> Result<Self> {
         let (shape, coarse, curl) = match other {
             Some(noise) => (noise.shape.clone(), noise.coarse.clone(), noise.curl.clone()),
@@ -88,8 +88,8 @@ impl Noise {
                 (view(&shape), coarse, view(&curl))
             }
         };
-        // Of as many texels where nothing is added: with others, levels of detail would filter otherwise, and the picture would
-        // leap by 1 to 4 % from no finer detail to any.
+        // The size does not depend on the finer detail: another number of texels changes the filtering by levels of
+        // detail, and the picture would jump by 1 to 4 % between no finer detail and any.
         let detail = volume(rec.gpu, "finer_detail", FINER * DETAIL_SIZE, (FINER * DETAIL_SIZE).ilog2() + 1);
         load_or_bake(rec, "noise", "finer_detail", &format!("{key:?} {finer}"), &[&detail], |rec| {
             bake_volume(rec, "finer_detail", vec![("volume_in", (&view(&coarse)).into())], &detail);
@@ -104,13 +104,14 @@ fn bake_curl(rec: &mut Recorder<'_>, target: &wgpu::Texture) {
     rec.fill(target, 0, &texels);
 }
 
-/// A volume of one channel with so many levels of detail.
+/// 3D texture of one channel with `levels` mips.
 fn volume(gpu: &Gpu, label: &str, size: u32, levels: u32) -> wgpu::Texture {
     gpu.volume(label, [size; 3], levels, wgpu::TextureFormat::R16Float)
 }
 
-/// Bakes a volume with the kernel `entry` from what it reads, and its mips from it, into a texture of one channel: with four,
-/// as the sources have it, reading took lavapipe a quarter of a frame, not a seventh. Such a texture cannot be stored to.
+/// Bakes a 3D texture with the kernel `entry`, and its mips, into a texture of one channel. With the four channels of
+/// the sources reads took lavapipe a quarter of a frame instead of a seventh. Stores to a texture of one channel are
+/// not supported, so it is filled from buffers.
 fn bake_volume(rec: &mut Recorder<'_>, entry: &'static str, reads: Bindings, target: &wgpu::Texture) {
     let size = target.width();
     let texture = rec.gpu.texture(entry, [size; 3], target.mip_level_count());

@@ -1,4 +1,4 @@
-//! The phase function of droplets by angle, as a texture.
+//! Mie phase function of droplets by scattering angle, as a texture.
 
 use std::f64::consts::PI;
 
@@ -9,10 +9,11 @@ use crate::gpu::disk_cache as cache;
 use crate::mie;
 use crate::params::Phase;
 
-/// Angles of the table: pi sin^2 of equal steps, dense where peak and glory are. 0.14 degrees apart in the middle.
+/// Number of angles: pi sin^2 of equal steps, dense at the forward peak and at the glory, 0.14 degrees apart in the
+/// middle.
 const ENTRIES: usize = 2048;
 
-/// The table on the GPU: the phase function, 1/sr, and its integral from the forward direction, at each angle.
+/// Phase-function LUT on the GPU: the phase function in 1/sr and its integral from the forward direction, by angle.
 #[derive(Default)]
 pub(crate) struct PhaseTable {
     lut: Lut<f32>,
@@ -35,7 +36,7 @@ impl PhaseTable {
     }
 }
 
-/// The table, from disk where an earlier process has made it: a second of work for the largest droplets.
+/// Table for a droplet diameter in µm, from the disk cache if possible: the largest droplets take a second.
 fn load_or_bake(diameter: f32) -> Vec<[f32; 2]> {
     let key = format!("{diameter} {ENTRIES} {}", mie::VERSION);
     if let Some(stored) = cache::load("phase", &key).filter(|stored| stored.len() == 8 * ENTRIES) {
@@ -50,7 +51,7 @@ fn table(diameter: f32) -> Vec<[f32; 2]> {
     let angles: Vec<_> =
         (0..ENTRIES).map(|i| PI * (0.5 * PI * i as f64 / (ENTRIES - 1) as f64).sin().powi(2)).collect();
     let phase = mie::phase(f64::from(diameter), &angles);
-    // By the rule of trapezoids over 1 - cos, exact for what is linear between entries.
+    // Trapezoidal rule over 1 - cos: exact for linear interpolation between entries.
     let cosine: Vec<_> = angles.iter().map(|angle| 2.0 * (0.5 * angle).sin().powi(2)).collect();
     let mut integral = vec![0.0];
     for i in 1..ENTRIES {

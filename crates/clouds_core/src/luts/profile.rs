@@ -1,11 +1,11 @@
-//! The user's density by height and type, as a texture.
+//! User-supplied table of density by height and cloud type, as a texture.
 
 use super::lut::{Inputs, Lut, view};
 use crate::error::Result;
 use crate::gpu::Recorder;
 use crate::schema::Table;
 
-/// The table on the GPU.
+/// Profile table on the GPU.
 #[derive(Default)]
 pub(crate) struct Profile {
     lut: Lut<Table>,

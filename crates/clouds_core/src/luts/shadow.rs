@@ -1,5 +1,5 @@
-//! Sunlight through the clouds to the ground: a map for the user, and levels around the eye for pictures of the ground and of
-//! shaded air, baked when sun or clouds have changed, or when wind or eye have gone far.
+//! Shadows of clouds: a map for the user, and a clipmap around the eye for pictures of the ground and of shaded air.
+//! The clipmap is rebaked when sun or clouds change, and when winds or eye have moved by a step.
 
 use super::lut::{Inputs, Lut, view};
 use super::volume::Grid;
@@ -12,36 +12,37 @@ use crate::shared::constants;
 use crate::uniforms::Dispatch;
 
 constants! {
-    /// Texels across a level of the shadows on the ground.
+    /// Side of a level of the shadow clipmap in texels.
     const SHADOW_SIDE: u32 = 88;
-    /// Levels of them, each twice as wide and coarse as the one before.
+    /// Number of levels of the shadow clipmap, each twice as wide and coarse as the one before.
     const SHADOW_LEVELS: u32 = 5;
 }
-/// What the shadows are made from: sun, clouds, weather, wind, planet and grid, and for where, how fine and when.
+
+/// Key of the shadow clipmap: shadow casters, planet and grid, snapped position and time, texel size.
 pub(crate) type Key = (Casters, (f32, Grid), [i64; 3], f32);
 
-/// The same for a picture.
+/// Key of the shadow clipmap of a picture.
 pub(crate) fn key(inputs: &Inputs<'_>) -> Key {
     let Inputs { params, frame, eye, time, .. } = *inputs;
     let planet = (params.atmosphere.planet_radius, Grid(params.volume.clone()));
     (casters(params), planet, origin(eye, params, time).steps, frame.sky.shadow_texel)
 }
 
-/// The levels on the GPU.
+/// Shadow clipmap on the GPU.
 #[derive(Default)]
 pub(crate) struct GroundShadow {
     lut: Lut<Key>,
 }
 
-/// Whether a picture reads them.
-fn wanted(frame: &Frame) -> bool {
+/// Whether a picture reads the shadow clipmap.
+fn is_read(frame: &Frame) -> bool {
     frame.light_shafts || frame.ground_shadow && !frame.cloudless
 }
 
 impl GroundShadow {
     pub fn update(&mut self, rec: &mut Recorder<'_>, inputs: &Inputs<'_>) -> Result<()> {
         let Inputs { params, frame, eye, time, .. } = *inputs;
-        if !wanted(frame) {
+        if !is_read(frame) {
             return Ok(());
         }
         let levels = self.lut.update(rec, key(inputs), |rec| {
@@ -67,7 +68,7 @@ impl GroundShadow {
     }
 }
 
-/// The user's map, of `size` by `size` texels, into `out`.
+/// Bakes the user's shadow map of `size` x `size` texels into `out`.
 pub(crate) fn map(rec: &mut Recorder<'_>, frame: &Frame, size: u32, out: &wgpu::Buffer) {
     let bindings = [&[("shadow_out", out.into())], frame.bindings(rec.gpu).as_slice()].concat();
     let gpu = rec.gpu;

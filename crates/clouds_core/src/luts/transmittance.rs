@@ -1,14 +1,14 @@
-//! The optical depth of the air to space, by altitude and direction.
+//! Transmittance LUT: optical depth of the atmosphere to space, by altitude and direction.
 
 use super::lut::{Inputs, Lut, bake_map, load_or_bake, view};
 use crate::error::Result;
 use crate::gpu::Recorder;
 use crate::params::{self, Params};
 
-/// Texels: distance to the top of the air, altitude (Hillaire 2020).
+/// Size in texels: distance to the top of the atmosphere, altitude (Hillaire 2020).
 const SIZE: [u32; 3] = [256, 64, 1];
 
-/// The table on the GPU.
+/// Transmittance LUT on the GPU.
 #[derive(Default)]
 pub(crate) struct Transmittance {
     lut: Lut<params::Atmosphere>,
@@ -30,7 +30,8 @@ impl Transmittance {
     }
 }
 
-/// What the air alone is made from: how much of it is seen between eye and clouds does not matter, nor the night behind it.
+/// Atmosphere reduced to the properties of the air. The strength of the aerial perspective and the night sky, which do
+/// not affect the air, are set to constants.
 pub(super) fn air(params: &Params) -> params::Atmosphere {
     params::Atmosphere { aerial_perspective: 1.0, night: [0.0; 3], ..params.atmosphere.clone() }
 }

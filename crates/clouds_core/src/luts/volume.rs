@@ -1,4 +1,4 @@
-//! The user's grid on the GPU, in the form that is read: half floats to be filtered, or f32 to be loaded.
+//! User-supplied extinction grid on the GPU: half floats for hardware filtering, or f32 for exact loads.
 
 use std::sync::Arc;
 
@@ -7,14 +7,14 @@ use crate::error::Result;
 use crate::gpu::Recorder;
 use crate::volume::DensityGrid;
 
-/// The grid as a texture, 1 at its largest extinction, which half floats could not hold.
+/// Grid texture, normalized to its largest extinction, which half floats could not hold.
 #[derive(Default)]
 pub(crate) struct Volume {
     lut: Lut<(Grid, bool)>,
 }
 
-/// Which grid there is: the same only if it is one in memory, as comparing them voxel by voxel would take longer than baking.
-/// It is held, so that no other can come to lie where it was.
+/// Identity of a grid: equal only for the same allocation, as a comparison of all voxels would take longer than a bake.
+/// The reference keeps the allocation alive, so that no other grid can reuse its address.
 #[derive(Clone)]
 pub(crate) struct Grid(pub Option<Arc<DensityGrid>>);
 

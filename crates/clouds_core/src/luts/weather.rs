@@ -1,4 +1,4 @@
-//! The weather map: baked from noise, the user's own, or a mixture of such maps.
+//! Weather map: baked from noise, user-supplied, or a mixture.
 
 use super::lut::{Inputs, Lut, MIXED, bake_map, load_or_bake, view};
 use crate::error::Result;
@@ -11,11 +11,11 @@ use crate::shared::constants;
 use crate::specialization;
 
 constants! {
-    /// Texels of the side of a baked weather map (nubis2015).
+    /// Side of a baked weather map in texels (nubis2015).
     const WEATHER_SIZE: u32 = 512;
 }
 
-/// Width and height of the map in texels: of a mixture the largest of each.
+/// Width and height of the weather map in texels; for a mixture the largest of each.
 pub(crate) fn size(params: &Params) -> [u32; 2] {
     let sizes = params.weather_shares().into_iter().map(|(weather, _)| size_of(&weather));
     sizes.fold([1; 2], |[w, h], [width, height]| [w.max(width), h.max(height)])
@@ -25,21 +25,21 @@ fn size_of(weather: &params::Weather) -> [u32; 2] {
     weather.map.as_ref().map_or([WEATHER_SIZE; 2], |map| [map.width as u32, map.height as u32])
 }
 
-/// A map on the GPU.
+/// Map of one weather on the GPU.
 struct Source {
     weather: params::Weather,
     texture: wgpu::Texture,
     token: Token,
-    /// Pictures since it was last needed.
+    /// Number of pictures since its last use.
     idle: u32,
 }
 
-/// The weather map on the GPU.
+/// Weather map on the GPU.
 #[derive(Default)]
 pub(crate) struct Weather {
-    /// The maps that this picture and the last one needed, so that one that goes back and forth bakes nothing.
+    /// Maps of this picture and the previous one, so that pictures that alternate rebake nothing.
     sources: Vec<Source>,
-    /// The mixture of them, if there is more than one, from these shares and read across this edge.
+    /// Mixture of several maps, by their weights and the addressing beyond the edge.
     mixture: Lut<(Vec<(params::Weather, f32)>, Edge), wgpu::Texture>,
 }
 
@@ -51,7 +51,7 @@ impl Weather {
         Ok(())
     }
 
-    /// The map that the march reads.
+    /// Weather map that the march reads.
     pub fn texture(&mut self, rec: &mut Recorder<'_>, params: &Params) -> Result<wgpu::Texture> {
         let shares = params.weather_shares();
         self.sources.retain(|source| rec.has(&source.token));
@@ -60,8 +60,8 @@ impl Weather {
         }
         let mut maps = Vec::new();
         for (weather, share) in &shares {
-            let known = self.sources.iter().position(|source| source.weather == *weather);
-            let index = match known {
+            let cached = self.sources.iter().position(|source| source.weather == *weather);
+            let index = match cached {
                 Some(index) => index,
                 None => {
                     let texture = bake_source(rec, params, weather)?;
@@ -89,7 +89,7 @@ fn sampler(gpu: &Gpu, edge: Edge) -> &wgpu::Sampler {
     }
 }
 
-/// The map of one weather, which may be another than the picture's.
+/// Map of one weather, which may differ from that of the picture.
 fn bake_source(rec: &mut Recorder<'_>, params: &Params, weather: &params::Weather) -> Result<wgpu::Texture> {
     if let Some(map) = &weather.map {
         return Ok(upload(rec.gpu, map));
@@ -113,7 +113,7 @@ fn upload(gpu: &Gpu, map: &Map) -> wgpu::Texture {
     texture
 }
 
-/// The weighted sum of several maps in so many texels.
+/// Weighted sum of several maps, of `width` x `height` texels.
 pub(crate) fn mix(
     rec: &mut Recorder<'_>,
     maps: &[(wgpu::Texture, f32)],
@@ -122,7 +122,7 @@ pub(crate) fn mix(
 ) -> wgpu::Texture {
     let (first, mut rest) = maps.split_first().expect("there are several");
     let mut sum = first.clone();
-    // The sum so far and three more at a time.
+    // Each dispatch adds three maps to the sum.
     while !rest.is_empty() {
         let (some, others) = rest.split_at(rest.len().min(MIXED.len() - 1));
         rest = others;

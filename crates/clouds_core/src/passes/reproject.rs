@@ -24,8 +24,9 @@ pub(crate) struct HistoryBuffers {
 }
 
 impl HistoryBuffers {
-    pub fn new(gpu: &Gpu, pixels: u64) -> Self {
-        Self { cloud_buffers: CloudBuffers::new(gpu, pixels), length: gpu.buffer("followed", 4 * pixels) }
+    /// Buffers of so many samples, and of so many history lengths: a still has none.
+    pub fn new(gpu: &Gpu, samples: u64, lengths: u64) -> Self {
+        Self { cloud_buffers: CloudBuffers::new(gpu, samples), length: gpu.buffer("followed", 4 * lengths) }
     }
 
     pub fn bindings(&self) -> Bindings {
@@ -89,14 +90,35 @@ pub(crate) struct Buffers<'a> {
     pub current: &'a Current,
     /// The clouds of the frame before.
     pub before: &'a HistoryBuffers,
-    /// The user's scene in it.
+    /// Clouds of the frame before where its sample grid was another.
+    pub resized: Option<&'a HistoryBuffers>,
+    /// The user's scene in the frame before.
     pub scene_before: &'a SceneTextures,
     pub now: &'a HistoryBuffers,
 }
 
-/// Makes a frame of rays of its own, one in each cell, and of the frame before; or, where the history says too little, a still.
+/// Records a frame: the first one, a still that is the history of those after it, or the one after a frame `previous`, by
+/// its number since the last cut.
+pub(crate) fn record(
+    rec: &mut Recorder<'_>,
+    frame: &Frame,
+    quality: &Quality,
+    previous: Option<u32>,
+    buffers: &Buffers<'_>,
+) {
+    if let Some(old) = buffers.resized {
+        rescale(rec, frame, old, buffers.before);
+    }
+    let Some(previous) = previous else {
+        rec.compile_ahead(|rec| follow(rec, frame, quality, 0, buffers));
+        return begin(rec, frame, quality, buffers.ray_list, buffers.now);
+    };
+    follow(rec, frame, quality, previous + 1, buffers);
+}
+
+/// Records a frame of one ray in each cell and of the history; or a still, where the history is invalid in too many pixels.
 /// `index` counts frames since the last cut.
-pub(crate) fn record(rec: &mut Recorder<'_>, frame: &Frame, quality: &Quality, index: u32, buffers: &Buffers<'_>) {
+fn follow(rec: &mut Recorder<'_>, frame: &Frame, quality: &Quality, index: u32, buffers: &Buffers<'_>) {
     let gpu = rec.gpu;
     let Buffers { ray_list, current, before, now, .. } = *buffers;
     let stride = frame.grid.stride();
@@ -133,14 +155,8 @@ pub(crate) fn record(rec: &mut Recorder<'_>, frame: &Frame, quality: &Quality, i
     rec.when(&current.still, |rec| begin(rec, frame, quality, ray_list, now));
 }
 
-/// Makes a still that is the history of the frames after it.
-pub(crate) fn begin(
-    rec: &mut Recorder<'_>,
-    frame: &Frame,
-    quality: &Quality,
-    ray_list: &RayList,
-    out: &HistoryBuffers,
-) {
+/// Records a still that is the history of the frames after it.
+fn begin(rec: &mut Recorder<'_>, frame: &Frame, quality: &Quality, ray_list: &RayList, out: &HistoryBuffers) {
     let mut still = frame.at_samples();
     march::record(rec, &still, quality, ray_list, &out.cloud_buffers);
     still.dispatch.lattice = refine::coarsest(&still, quality);
@@ -150,7 +166,7 @@ pub(crate) fn begin(
 }
 
 /// Makes of the frame `before`, which had another size or was known at other pixels, one like `frame`.
-pub(crate) fn rescale(rec: &mut Recorder<'_>, frame: &Frame, before: &HistoryBuffers, out: &HistoryBuffers) {
+fn rescale(rec: &mut Recorder<'_>, frame: &Frame, before: &HistoryBuffers, out: &HistoryBuffers) {
     let bindings = [vec![frame.dispatch.binding(rec.gpu)], out.bindings(), before.past()].concat();
     let [width, height] = frame.grid.samples();
     rec.dispatch(("reproject", "rescale"), bindings, [width, height, 1]);

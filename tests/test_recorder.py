@@ -33,7 +33,7 @@ for picture in {pictures}:
 STILLS = "(renderer.render(camera, params) for _ in range(5))"
 FRAMES = "renderer.animate((camera, params, i / 24) for i in range(20))"
 
-# So small that the device learns nothing of their kernels (`TOO_FEW` in gpu.rs): what is thought of
+# So small that the device learns nothing of their kernels (`MIN_TIMED_INVOCATIONS` in gpu/recorder.rs): what is thought of
 # those comes to a fifth of a slice, whatever else the machine does. So narrow that rays are a
 # lattice, as those of larger pictures are; up to a million pixels (`STRIP_PIXELS` in plan.rs) these
 # are recorded alike.

@@ -699,7 +699,7 @@ class Quality(Block):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Params(Root):
-    """Everything that a sky looks like; the defaults are a fair-weather sky.
+    """All parameters of a sky; the defaults are a fair-weather sky.
 
     Attributes
     ----------
@@ -732,12 +732,13 @@ class Params(Root):
     atmosphere : Atmosphere
         The planet, its atmosphere, and the shadows of clouds on both.
     weather_mix : tuple of (Weather, float)
-        Other weathers and their shares of the weather map: each from 0 to 1, together 1 at most;
-        the rest is that of `weather`. All have the same `extent` and `edge`. Weathers change by it
-        (thesis2018): see `WeatherBlend` and `lerp`.
+        Further weathers and their weights in the weather map. Each weight is from 0 to 1, their sum
+        at most 1; `weather` has the rest. All weathers have the same `extent`, `edge` and
+        `broad_extent`. A change of the weather is a mixture of varying weights (thesis2018): see
+        `WeatherBlend` and `lerp`.
     volume : DensityGrid or None
-        A cloud of your own in place of all others: high clouds come with it where
-        `high_clouds.with_volume` is True.
+        User-supplied extinction grid that replaces the procedural clouds, and the high clouds
+        unless `high_clouds.with_volume` is True.
     """
 
     sun: Sun = field(default_factory=Sun)

@@ -1,13 +1,14 @@
-// The air between the eye and what it sees, and the light along a ray: both follow from the distance alone, and smoothly,
-// so that a ray works them out at four distances and not for every sample.
+// Aerial perspective: transmittance and inscattered radiance of the air between the eye and a point. Both are smooth
+// functions of distance along a ray, and so is the light at a point. Each ray evaluates them at four distances and
+// interpolates, instead of once per sample.
 #import atmosphere
 #import light_shafts
 
-// The air along a ray, up to the ground or to space.
+// Segment of a ray inside the atmosphere: from its entry to the ground or to space.
 struct AirSegment {
-    start: f32, // where the ray enters the air, m
-    length: f32, // m from there
-    grounded: bool, // whether it ends on the ground
+    start: f32, // distance of the entry into the atmosphere, m
+    length: f32, // m
+    grounded: bool, // whether the segment ends on the ground
 }
 
 fn air_segment(direction: vec3f) -> AirSegment {
@@ -17,7 +18,7 @@ fn air_segment(direction: vec3f) -> AirSegment {
     return AirSegment(air.near, select(0.0, max(end - air.near, 0.0), air.hit), ground.enters);
 }
 
-// Optical depth of the air between two distances on a ray from the eye, in so many pieces.
+// Optical depth of the air between two distances on a ray from the eye, integrated in `pieces` pieces.
 fn aerial_depth(direction: vec3f, start: f32, end: f32, pieces: u32) -> vec3f {
     var depth = vec3f(0.0);
     var before = altitude_at(start * direction);
@@ -30,19 +31,19 @@ fn aerial_depth(direction: vec3f, start: f32, end: f32, pieces: u32) -> vec3f {
     return depth;
 }
 
-// The air before a distance: its transmittance, and the radiance that it adds.
+// Air before a distance: its transmittance and its inscattered radiance.
 struct Air {
     transmittance: vec3f,
     radiance: vec3f,
 }
 
-// Pieces of the way to the first distance, and of the ways between them.
+// Pieces of the integral to the first of the four distances, and between two of them.
 const FIRST_PIECES = 4u;
 const PIECES = 2u;
-// Pieces of the way to the ground.
+// Pieces of the integral to the ground.
 const GROUND_PIECES = 8u;
 
-// The air before a distance on a ray, of a sky of so much radiance.
+// Air before a distance on a ray. `sky` is the radiance of the whole ray (sky-view LUT).
 fn air_before(direction: vec3f, distance: f32, way: AirSegment, texels: AirTexels, sky: vec3f) -> Air {
     let start = min(way.start, distance);
     let end = min(distance, way.start + way.length);
@@ -55,19 +56,23 @@ fn air_of(depth: vec3f, distance: f32, way: AirSegment, texels: AirTexels, sky: 
     let root = sqrt(saturate((distance - way.start) / max(way.length, 1e-3)));
     let at = vec3f(texels.share, (root * (slices - 1.0) + 0.5) / slices);
     let share = saturate(textureSampleLevel(aerial_perspective_lut, clamp_sampler, at, 0.0).rgb);
-    // So much more air hides so much more of the sky behind.
+    // Scaling by the amount of air: the share of the sky's radiance from behind the distance falls exponentially with
+    // it.
     let scaled = select(1.0 - pow(1.0 - share, vec3f(amount)), share, amount == 1.0);
     var radiance = scaled * sky;
     if LIGHT_SHAFTS {
         let lack = shafts_before(texels.shafts, distance);
-        radiance = max(radiance - select(scaled / max(share, vec3f(1e-6)), vec3f(1.0), amount == 1.0) * lack, vec3f(0.0));
+        radiance = max(
+            radiance - select(scaled / max(share, vec3f(1e-6)), vec3f(1.0), amount == 1.0) * lack,
+            vec3f(0.0),
+        );
     }
     return Air(exp(-amount * depth), radiance);
 }
 
-// Where the textures of the air have a direction.
+// Texture coordinates of a direction in the LUTs of the air.
 struct AirTexels {
-    share: vec2f, // `aerial_perspective_lut`
+    share: vec2f, // in `aerial_perspective_lut`
     shafts: vec2f,
 }
 
@@ -80,7 +85,7 @@ fn air_texels(direction: vec3f) -> AirTexels {
     return AirTexels(share, shafts);
 }
 
-// All the air along a ray: to the ground, or to space from where it enters the air.
+// Air along a whole ray: to the ground, or to space from the entry into the atmosphere.
 fn whole_air(direction: vec3f, way: AirSegment, texels: AirTexels, sky: vec3f) -> Air {
     var radiance = sky;
     if LIGHT_SHAFTS {
@@ -95,27 +100,27 @@ fn whole_air(direction: vec3f, way: AirSegment, texels: AirTexels, sky: vec3f) -
     return Air(select(vec3f(1.0), through, way.length > 0.0), radiance);
 }
 
-// Four distances on a ray, the first where its clouds may begin and the last where they end: near ones lie closer together.
+// Four sample distances on a ray, from the start of its clouds to their end. Spacing grows with distance.
 struct AerialPoints {
     start: f32,
     length: f32,
-    bend: f32, // m from the start within which they are as good as evenly spread
+    bend: f32, // distance from the start up to which spacing is about uniform, m
 }
 
-// The air hides half of what is some tens of kilometres away.
+// Scale of that spacing, m: air hides about half of an object some tens of kilometres away.
 const AERIAL_BEND = 40000.0;
 
 fn aerial_points(start: f32, length: f32) -> AerialPoints {
     return AerialPoints(start, max(length, 1.0), AERIAL_BEND);
 }
 
-// The distance of a node.
+// Distance of sample point `k`, m.
 fn aerial_point_distance(nodes: AerialPoints, k: f32) -> f32 {
     let x = k / 3.0;
     return nodes.start + nodes.length * nodes.bend * x / (nodes.length + nodes.bend - nodes.length * x);
 }
 
-// Shares of a distance in the four nodes, by which what is worked out there is interpolated.
+// Interpolation weights of the four sample points at a distance.
 fn aerial_point_shares(nodes: AerialPoints, distance: f32) -> vec4f {
     let d = clamp(distance - nodes.start, 0.0, nodes.length);
     let k = 3.0 * d * (nodes.length + nodes.bend) / (nodes.length * (d + nodes.bend));

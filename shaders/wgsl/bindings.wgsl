@@ -1,210 +1,222 @@
-// Every resource that a shader can name, numbered once. A kernel binds only those that it uses.
+// Resources of all shaders, each with one number. A kernel binds only those that it uses.
 #import constants
 #import params
 #import uniforms
 
-// What a pipeline is made for; the rest is compiled out (crates/clouds_core/src/gpu/kernel.rs).
+// Specialization: a pipeline is compiled for these values, without the code that they switch off
+// (crates/clouds_core/src/specialization.rs).
 override MODEL: u32 = 0u; // light.model
 override PHASE: u32 = 0u; // light.phase
-override VOLUME: bool = false; // the clouds are the user's grid, not procedural
-override KEEP_CLEAR: bool = false; // there is a spot without clouds
-override CAMERA: u32 = 0u; // the projection, see camera.wgsl
-override PRECISE: bool = false; // that grid is read by loads and in f32, not filtered by the hardware in half floats
-override AIR: bool = true; // there is air
-override SUNLIT: bool = true; // the sun can reach the clouds
-override RAINY: bool = true; // it may rain: cumulonimbus grow
-override RAIN_SHAFTS: bool = true; // rain is seen below the clouds
-override UPPER: bool = true; // there is a second deck
-override LARGE_SCALE_WEATHER: bool = true; // a larger map shifts the weather
-override PROFILE_TABLE: bool = false; // the profile by height is the user's table
-override LIGHT_SHAFTS: bool = false; // clouds cast shadows on the air
-override SCENE: bool = false; // there is a scene of the user's among the clouds
-override SUBRAYS: bool = false; // pixels may be wider than clouds, see subrays.wgsl
-override LOW_RESOLUTION: bool = false; // the clouds are known at the corners of cells of pixels alone, see sample_grid.wgsl
-override WIDE_PHASE: bool = false; // the phase function varies within a pixel
-override LIGHT_DETAIL: bool = true; // there are light samples that see the detail
-override LIGHT_CHEAP: bool = true; // there are light samples that do not
+override VOLUME: bool = false; // clouds from the user's grid instead of procedural ones
+override KEEP_CLEAR: bool = false; // a region kept clear of clouds
+override CAMERA: u32 = 0u; // projection (camera.wgsl)
+override PRECISE: bool = false; // the user's grid read by loads in f32, not by hardware filters in half floats
+override AIR: bool = true; // atmosphere
+override SUNLIT: bool = true; // sunlight can reach the clouds
+override RAINY: bool = true; // rain, and with it cumulonimbus
+override RAIN_SHAFTS: bool = true; // visible rain below the clouds
+override UPPER: bool = true; // a second deck
+override LARGE_SCALE_WEATHER: bool = true; // a larger map offsets the weather map
+override PROFILE_TABLE: bool = false; // height profile from the user's table
+override LIGHT_SHAFTS: bool = false; // cloud shadows on the air
+override SCENE: bool = false; // a user's scene among the clouds
+override SUBRAYS: bool = false; // pixels may be wider than clouds (subrays.wgsl)
+override LOW_RESOLUTION: bool = false; // samples of the clouds only at corners of cells of pixels (sample_grid.wgsl)
+override WIDE_PHASE: bool = false; // phase function averaged over a pixel
+override LIGHT_DETAIL: bool = true; // light samples with detail noise
+override LIGHT_CHEAP: bool = true; // light samples without detail noise
 
-// By how long they hold: what the user sets; what follows from that for a frame; which pixels a dispatch is for. No
-// other block may decide a branch by itself: of the fourth and later ones of a kernel, by number, lavapipe (Mesa 22.3)
-// notes that beyond the end of a table, and crashes.
+// Uniform blocks by lifetime: the user's settings, quantities derived from them for a frame, range of pixels of a
+// dispatch. No other block may decide a branch by itself: lavapipe (Mesa 22.3) records such use of the fourth and later
+// blocks of a kernel, by number, beyond the end of a table, and crashes.
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<uniform> frame: Frame;
 @group(0) @binding(28) var<uniform> dispatch: Dispatch;
 @group(0) @binding(2) var repeat_sampler: sampler; // linear, nearest mip, repeats
 @group(0) @binding(3) var clamp_sampler: sampler; // linear, clamps
-@group(0) @binding(42) var weather_sampler: sampler; // linear, beyond the map as weather.edge says
+@group(0) @binding(42) var weather_sampler: sampler; // linear; `weather.edge` sets the values beyond the map
 
-// Baked. All half floats: lavapipe filters those exactly and 8-bit ones to 256 levels only.
+// Baked textures, all in half floats: lavapipe filters half floats exactly, 8-bit formats in 256 levels.
 @group(0) @binding(4) var shape_noise: texture_3d<f32>; // base shape (passes/noise)
-@group(0) @binding(5) var detail_noise: texture_3d<f32>; // of the edges (passes/noise)
-@group(0) @binding(6) var curl_noise: texture_2d<f32>; // a divergence-free vector in xy (passes/noise)
+@group(0) @binding(5) var detail_noise: texture_3d<f32>; // noise that erodes the edges (passes/noise)
+@group(0) @binding(6) var curl_noise: texture_2d<f32>; // divergence-free vector in xy (passes/noise)
 @group(0) @binding(7) var weather_map: texture_2d<f32>; // coverage, type, precipitation (passes/weather)
-@group(0) @binding(48) var broad_map: texture_2d<f32>; // shifts of those, and what bends the smaller map (passes/large_scale_weather)
+// Large-scale weather: offsets to the values of the weather map, and the displacement of that map
+// (passes/large_scale_weather).
+@group(0) @binding(48) var broad_map: texture_2d<f32>;
 @group(0) @binding(49) var profile_table: texture_2d<f32>; // density by type and height (passes/profile)
 @group(0) @binding(50) var phase_table: texture_2d<f32>; // phase function and its integral by angle (passes/phase)
 @group(0) @binding(8) var high_map: texture_2d<f32>; // density of the high clouds (passes/high_clouds)
-@group(0) @binding(9) var sky_view_lut: texture_2d<f32>; // the sky by direction, times frame.sky.sky_scale (passes/sky)
-@group(0) @binding(60) var transmittance_lut: texture_2d<f32>; // of the air to space, by altitude and direction (passes/transmittance)
-@group(0) @binding(61) var multiscattering_lut: texture_2d<f32>; // scattered light by altitude and sun, see SCATTERED (passes/multiscatter)
-@group(0) @binding(62) var aerial_perspective_lut: texture_3d<f32>; // share of the sky before a distance, by direction (passes/sky)
-@group(0) @binding(10) var<storage, read_write> sky_light: array<vec4f, 4>; // what the sky gives to clouds (passes/sky)
-// The same for where it decides no branch: a load from storage costs lavapipe a loop over the lanes.
+@group(0) @binding(9) var sky_view_lut: texture_2d<f32>; // sky radiance by direction, times sky_scale (passes/sky)
+// Optical depth of the air to space, by altitude and direction (passes/transmittance).
+@group(0) @binding(60) var transmittance_lut: texture_2d<f32>;
+// Scattered light by altitude and elevation of the sun; tables from SCATTERED on (passes/multiscatter).
+@group(0) @binding(61) var multiscattering_lut: texture_2d<f32>;
+// Fraction of the sky's radiance from before a distance, by direction (passes/sky).
+@group(0) @binding(62) var aerial_perspective_lut: texture_3d<f32>;
+@group(0) @binding(10) var<storage, read_write> sky_light: array<vec4f, 4>; // sun and sky on the clouds (passes/sky)
+// `sky_light` for reads that decide no branch: a load from storage costs lavapipe a loop over the lanes.
 @group(0) @binding(41) var<uniform> sky_light_uniform: array<vec4f, 4>;
 @group(0) @binding(11) var blue_noise: texture_2d<f32>; // 64 x 64 ranks in [0, 1), void and cluster
 
-@group(0) @binding(30) var volume: texture_3d<f32>; // the user's grid, 1 at its largest extinction, in half floats
-@group(0) @binding(31) var volume_exact: texture_3d<f32>; // the same in f32, which cannot be filtered everywhere
-@group(0) @binding(32) var majorants: texture_3d<f32>; // what the density nearby never exceeds (passes/majorant)
+@group(0) @binding(30) var volume: texture_3d<f32>; // user's grid, 1 at its largest extinction, in half floats
+@group(0) @binding(31) var volume_exact: texture_3d<f32>; // user's grid in f32, which not all adapters can filter
+@group(0) @binding(32) var majorants: texture_3d<f32>; // upper bound of the density in a cell (passes/majorant)
 
-// The user's scene, a texel for each pixel of the sheet, row after row (scene_depth.wgsl).
-@group(0) @binding(70) var scene_depth: texture_2d<f32>; // m along the ray
-@group(0) @binding(54) var scene_before: texture_2d<f32>; // m along the ray in the frame before (passes/reproject)
-@group(0) @binding(71) var scene_color: texture_2d<f32>; // its radiance
+// User's scene: a texel for each pixel of the strip, row by row (scene_depth.wgsl).
+@group(0) @binding(70) var scene_depth: texture_2d<f32>; // distance along the ray, m
+@group(0) @binding(54) var scene_before: texture_2d<f32>; // `scene_depth` of the previous frame (passes/reproject)
+@group(0) @binding(71) var scene_color: texture_2d<f32>; // radiance
 
-// Direct sun on the ground around the eye: levels in a stack, and, while they are baked, the mean of the last (passes/shadow).
+// Shadow clipmap: transmittance toward the sun around the eye, levels stacked in one texture; and, while the clipmap is
+// baked, the mean of its last level (passes/shadow).
 @group(0) @binding(72) var ground_shadow: texture_2d<f32>;
 @group(0) @binding(73) var ground_shadow_mean: texture_2d<f32>;
-// Light that the air before a distance lacks in those shadows, by place in the picture, times sky_scale (passes/light_shafts).
+// Light shafts: radiance that the air before a distance lacks in those shadows, by position in the picture, times
+// sky_scale (passes/light_shafts).
 @group(0) @binding(51) var light_shafts: texture_3d<f32>;
 
-// One entry a pixel, row by row; of the clouds one for each that they are known at (sample_grid.wgsl).
+// Buffers with an entry for each pixel, row by row. Those of the clouds have an entry for each sample of the sample
+// grid (sample_grid.wgsl).
 @group(0) @binding(12) var<storage, read_write> clouds: array<vec4f>; // premultiplied radiance, transmittance
-@group(0) @binding(13) var<storage, read_write> cloud_depth: array<f32>; // m to the mean scattering point, -1 where none
+@group(0) @binding(13) var<storage, read_write> cloud_depth: array<f32>; // m to the mean scattering point, -1 if none
 @group(0) @binding(14) var<storage, read_write> samples: array<u32>; // density evaluations
-@group(0) @binding(15) var<storage, read_write> image: array<vec4f>; // what the caller gets
+@group(0) @binding(15) var<storage, read_write> image: array<vec4f>; // picture returned to the caller
 @group(0) @binding(16) var<storage, read_write> sky: array<vec4f>; // radiance without clouds
-@group(0) @binding(29) var<storage, read_write> depth: array<f32>; // of all clouds together, -1 where none
+@group(0) @binding(29) var<storage, read_write> depth: array<f32>; // of all clouds together, m, -1 if none
 
-// What is behind the marched clouds at the corners of cells (passes/composite): the high clouds as `clouds`; the radiance
-// behind them, with their distance times their opacity, m; transmittance of the air before them, with the brightness of
-// all together; radiance of that air, with the brightness behind them. On the ground, where the distance is less than 0, the
-// same of shadows: the light they lack as radiance, the ground without them, and what one of no sun at all would lack.
+// Background of the marched clouds at the corners of cells (passes/composite), in columns:
+// 0: high clouds: premultiplied radiance, transmittance.
+// 1: radiance behind the high clouds; distance times opacity of the high clouds, m.
+// 2: transmittance of the air before the high clouds; brightness of high clouds and background together.
+// 3: radiance of that air; brightness of the background alone.
+// Corners on the ground have a negative distance, and in place of high clouds the shadows on the ground: minus the
+// radiance that shadows remove; radiance of the unshadowed ground; radiance that full shadow would remove.
 @group(0) @binding(55) var<storage, read_write> corners: array<mat4x4f>;
 
-// Temporal reprojection: the marched subset, and the frame before.
+// Temporal reprojection: rays of this frame, one in each cell, and the previous frame.
 @group(0) @binding(17) var<storage, read_write> current: array<vec4f>;
 @group(0) @binding(18) var<storage, read_write> current_depth: array<f32>;
 @group(0) @binding(19) var<storage, read_write> history: array<vec4f>;
 @group(0) @binding(20) var<storage, read_write> history_depth: array<f32>;
 @group(0) @binding(58) var<storage, read_write> cells: array<CellPast>;
-// How much each pixel rests on, in frames (passes/reproject): in the frame before, and in this one.
+// History lengths of the previous frame (`history_length`) and of this one (`followed`), in frames (passes/reproject).
 @group(0) @binding(56) var<storage, read_write> history_length: array<u32>;
 @group(0) @binding(57) var<storage, read_write> followed: array<u32>;
 
-// Pixels that are marched one by one: how many are in `active_rays`, and between which distances from the start of its
-// march each pixel's ray meets cloud (passes/refine).
+// Ray list `active_rays`: its length, and the range of distances from the start of the march in which each pixel's ray
+// meets cloud (passes/refine).
 @group(0) @binding(38) var<storage, read_write> ray_count: atomic<u32>;
 @group(0) @binding(39) var<storage, read_write> cloud_span: array<vec2f>;
 
-// Indirect dispatches (passes/arrange): what is arranged, how many entries the list has, the arguments, and, in `w`,
-// how many invocations the whole list has.
+// Indirect dispatches (passes/arrange): size of the dispatch, length of the list, arguments. `listed` has the number of
+// invocations of the whole list in `w`.
 @group(0) @binding(74) var<uniform> arrangement: vec4u;
 @group(0) @binding(75) var<storage, read_write> list_count: u32;
 @group(0) @binding(76) var<storage, read_write> arguments: array<u32>;
 @group(0) @binding(77) var<uniform> listed: vec4u;
 
-// Whether a frame is a still (passes/reproject): votes for that less those for going on; how many pixels may be marched
-// one by one, as an f32; and the decision.
+// Decision whether a frame is a still (passes/reproject): votes for a still minus votes against it; maximum length of
+// the ray list, as an f32; result.
 @group(0) @binding(78) var<storage, read_write> votes: atomic<i32>;
 @group(0) @binding(79) var<uniform> most_listed: vec4f;
 @group(0) @binding(80) var<storage, read_write> is_still: u32;
 
-// Rays that take more steps than one dispatch may: what each remembers, which are not done, and how far each got.
+// Rays that take more steps than one dispatch allows: their states, the list of unfinished rays, their progress.
 @group(0) @binding(33) var<storage, read_write> reference_rays: array<ReferenceRay>;
 @group(0) @binding(34) var<storage, read_write> path_rays: array<PathRay>;
 @group(0) @binding(35) var<storage, read_write> active_rays: array<u32>;
-@group(0) @binding(36) var<storage, read_write> progress: array<vec2u>; // iterations in this dispatch, 1 when done
-@group(0) @binding(37) var<storage, read_write> uncertainty: array<vec4f>; // of the radiance of each pixel
+@group(0) @binding(36) var<storage, read_write> progress: array<vec2u>; // iterations in this dispatch; 1 if done
+@group(0) @binding(37) var<storage, read_write> uncertainty: array<vec4f>; // of each pixel's radiance
 
-// What the frame before says of the ray of a cell (passes/reproject).
+// Prediction of the ray of a cell from the history (passes/reproject).
 struct CellPast {
-    predicted: vec4f, // as `clouds`
-    gain: vec3f, // by how much the clouds around have become brighter
+    predicted: vec4f, // premultiplied radiance, transmittance
+    gain: vec3f, // ratio of brightness to the previous frame, of the clouds around
     error: f32, // contrast between ray and prediction
-    motion: vec2f, // pixels to where the cell was
-    distance: f32, // m to its nearest cloud, -1 if there is none
-    ray_distance: f32, // m to that of its ray, -1 if there is none
-    approach: f32, // m that this has come nearer
-    glare: f32, // relative change of the light that is scattered toward the eye
-    source: u32, // what the prediction rests on
-    width: f32, // between known pixels at distance 1
+    motion: vec2f, // offset to the cell's position in the previous frame, samples
+    distance: f32, // m to the nearest cloud of the cell, -1 if there is none
+    ray_distance: f32, // m to the cloud of the cell's ray, -1 if there is none
+    approach: f32, // m by which the cloud has come nearer
+    glare: f32, // relative change of the light scattered toward the eye
+    source: u32, // origin of the prediction: UNSEEN, INTERPOLATED or MARCHED
+    width: f32, // spacing of samples at distance 1
 }
 
-// A ray on its way to convergence (passes/reference).
+// State of a ray that is integrated to convergence (passes/reference).
 struct ReferenceRay {
-    previous: vec4f, // radiance and transmittance with panels twice as long
-    // As `Gathered`.
+    previous: vec4f, // radiance and transmittance for panels of twice the length
+    // Sums of the scattering (`Gathered`).
     sun: vec4f,
     above: vec4f,
     weight: vec4f,
     stage: u32,
-    level: u32, // how many times the panels have been halved
+    level: u32, // number of halvings of the panels
     evaluations: u32,
     x: f32, // m into the segments
-    longest: f32, // length that the next panel may have, m
+    longest: f32, // maximum length of the next panel, m
     optical_depth: f32,
-    // The panel at hand, and what is known of its two points.
+    // Current panel, and the values at its two points.
     end: f32,
     point: u32,
     density: vec2f,
-    share: vec2f, // of the ambient light from above
+    share: vec2f, // share of the ambient light from above
     precipitation: vec2f,
-    first_depth: f32, // toward the sun, from the first of them
-    // The ray from a point toward the sun.
+    first_depth: f32, // optical depth toward the sun from the first point
+    // Current ray from a point toward the sun.
     sun_start: f32,
     sun_first: f32,
     sun_gap: f32,
     sun_second: f32,
     sun_x: f32,
     sun_depth: f32,
-    distance: f32, // as in `Gathered`
+    distance: f32, // mean distance by weight, unnormalised, m
 }
 
-// A pixel whose paths are traced one after another (passes/path).
+// State of a pixel whose paths are traced one after another (passes/path).
 struct PathRay {
-    radiance: vec3f, // sums over the paths so far
-    done: u32, // paths
+    radiance: vec3f, // sum over the paths so far
+    done: u32, // number of paths so far
     squares: vec3f,
-    seen: f32, // paths that met no cloud
+    seen: f32, // number of paths that met no cloud
     throughput: vec3f,
-    distance: f32, // to first scatterings
-    light: vec3f, // of the path at hand
+    distance: f32, // to first scatterings, m
+    light: vec3f, // of the current path
     stage: u32,
-    origin: vec3f, // of the flight at hand
+    origin: vec3f, // of the current flight
     scatterings: u32,
     direction: vec3f,
     x: f32, // m into the segments of the flight
-    flight: vec4f, // as `Segments`
+    flight: vec4f, // `Segments`
     shadow: f32, // transmittance toward the sun so far
     width: f32, // footprint, m
-    random_dimension: u32, // random numbers used by the path
+    random_dimension: u32, // number of random numbers used by the path
     evaluations: u32,
-    sunlight: vec3f, // what the sun adds to the path if nothing shadows it
+    sunlight: vec3f, // light that the sun adds to the path without shadow
 }
 
-// Outputs of the bakes.
+// Outputs of bakes.
 @group(0) @binding(23) var volume_in: texture_3d<f32>;
 @group(0) @binding(24) var volume_out: texture_storage_3d<rgba16float, write>;
-@group(0) @binding(22) var<storage, read_write> texels_out: array<u32>; // of one channel, two half floats in each
+@group(0) @binding(22) var<storage, read_write> texels_out: array<u32>; // one channel, two half floats in each word
 
-// Words of a row of so many of those: padded, as copies to a texture ask for.
+// Words per row of `texels_out` for a number of texels: padded to the row alignment of copies to textures.
 fn packed_row(texels: u32) -> u32 {
     return (texels + (COPIED / 2u - 1u)) / (COPIED / 2u) * (COPIED / 4u);
 }
 
-@group(0) @binding(43) var mix_a: texture_2d<f32>; // weather maps, or orders of scattering, that are mixed
+@group(0) @binding(43) var mix_a: texture_2d<f32>; // inputs of mixtures: weather maps, or orders of scattering
 @group(0) @binding(44) var mix_b: texture_2d<f32>;
 @group(0) @binding(45) var mix_c: texture_2d<f32>;
 @group(0) @binding(46) var mix_d: texture_2d<f32>;
 @group(0) @binding(47) var<uniform> mix_shares: vec4f;
-@group(0) @binding(64) var<storage, read_write> shadow_out: array<f32>; // the user's shadow map, row by row
+@group(0) @binding(64) var<storage, read_write> shadow_out: array<f32>; // user's shadow map, row by row
 @group(0) @binding(25) var map_out: texture_storage_2d<rgba16float, write>;
 
-// What is shown in a window (passes/display).
+// Picture in a window (passes/display).
 @group(0) @binding(52) var screen: texture_storage_2d<rgba8unorm, write>;
 @group(0) @binding(53) var<uniform> shown: vec4f; // exposure as a factor, tone map
 
-// Queries at points, and probes of shader functions.
+// Queries at points; probes of shader functions.
 @group(0) @binding(26) var<storage, read_write> points: array<vec4f>;
 @group(0) @binding(27) var<storage, read_write> results: array<vec4f>;

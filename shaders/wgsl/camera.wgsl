@@ -1,12 +1,13 @@
-// Which way a pixel looks, and which pixel a direction falls on, for every kind of camera.
+// Projections: the direction of a pixel and the pixel of a direction, for each kind of camera.
 #import math
 #import bindings
 
-// A direction to the right, up and forward, or nothing (w = 0) outside the circle of a fisheye. Of a pinhole its last is 1,
-// which keeps the digits of narrow views; of the others it is one long. `pixel` has its centres at half-integers.
+// Direction of a position in pixels: right, up and forward; w is 1, or 0 outside the circle of a fisheye. The forward
+// component of a pinhole is 1, which keeps the digits of narrow views. Directions of the other projections are unit
+// vectors. Pixel centres are at half-integers.
 fn local_direction(pixel: vec2f) -> vec4f {
     let size = vec2f(f32(frame.view.width), f32(frame.view.height));
-    let ndc = vec2f(2.0, -2.0) * (pixel / size) + vec2f(-1.0, 1.0); // right and up
+    let ndc = vec2f(2.0, -2.0) * (pixel / size) + vec2f(-1.0, 1.0); // right and up, -1 to 1
     var local: vec3f; // right, up, forward
     var valid = 1.0;
     switch CAMERA {
@@ -29,14 +30,14 @@ fn local_direction(pixel: vec2f) -> vec4f {
     return vec4f(local, valid);
 }
 
-// The same in the world, one long.
+// Unit direction of a position in pixels, in the world; w as in `local_direction`.
 fn view_direction(pixel: vec2f) -> vec4f {
     let local = local_direction(pixel);
     let direction = local.x * frame.view.right + local.y * frame.view.up + local.z * frame.view.forward;
     return vec4f(normalize(direction), local.w);
 }
 
-// Solid angle that a place in the picture stands for, as a share of the most that any does.
+// Solid angle per area of the picture at a position in pixels, relative to its maximum over the picture.
 fn place_weight(pixel: vec2f) -> f32 {
     let local = local_direction(pixel).xyz;
     switch CAMERA {
@@ -54,7 +55,7 @@ fn place_weight(pixel: vec2f) -> f32 {
     }
 }
 
-// Solid angle of a pixel, given by its corner, sr.
+// Solid angle of a pixel, sr. `corner` is its upper left corner.
 fn pixel_solid_angle(corner: vec2f) -> f32 {
     let size = vec2f(f32(frame.view.width), f32(frame.view.height));
     switch CAMERA {
@@ -68,13 +69,16 @@ fn pixel_solid_angle(corner: vec2f) -> f32 {
             return width * width * place_weight(corner + 0.5);
         }
         default: {
-            // Two triangles (Van Oosterom and Strackee 1983), whose determinant is their area at distance 1.
+            // Two spherical triangles (Van Oosterom and Strackee 1983). The determinant of each is the area of the
+            // pixel at distance 1.
             let a = local_direction(corner).xyz;
             let b = local_direction(corner + vec2f(1.0, 0.0)).xyz;
             let c = local_direction(corner + 1.0).xyz;
             let d = local_direction(corner + vec2f(0.0, 1.0)).xyz;
             let wide = 2.0 * frame.view.tan_half_fov / size.y;
-            return 2.0 * (atan2(wide * wide, triangle_denominator(a, b, c)) + atan2(wide * wide, triangle_denominator(a, c, d)));
+            return 2.0
+                * (atan2(wide * wide, triangle_denominator(a, b, c))
+                    + atan2(wide * wide, triangle_denominator(a, c, d)));
         }
     }
 }
@@ -84,15 +88,15 @@ fn triangle_denominator(a: vec3f, b: vec3f, c: vec3f) -> f32 {
     return l.x * l.y * l.z + dot(a, b) * l.z + dot(b, c) * l.x + dot(c, a) * l.y;
 }
 
-// The pixel that is marched for a cell of a subset. The last cells may hang over the edge; they march the edge, or, in a sparse
-// picture, what is beyond.
+// Pixel that is marched for a cell. The last cells may extend beyond the picture: they march the pixel at its edge or,
+// at low resolution, a pixel beyond it.
 fn marched_pixel(cell: vec2u) -> vec2u {
     let pixel = cell * dispatch.stride + vec2u(dispatch.subpixel_x, dispatch.subpixel_y);
     return select(min(pixel, vec2u(frame.view.width, frame.view.height) - 1u), pixel, LOW_RESOLUTION);
 }
 
-// Where in the picture of a camera a direction falls, given as right, up and forward of that: from -1 to 1, right and up, or
-// beyond; z is 0 behind the camera.
+// Position in the picture of a direction, given as right, up and forward of the camera: right and up, from -1 to 1
+// inside the picture. z is 0 behind the camera.
 fn picture_place(local: vec3f, tan_half_fov: f32, half_fov: f32) -> vec3f {
     let size = vec2f(f32(frame.view.width), f32(frame.view.height));
     var ndc: vec2f;
@@ -114,7 +118,8 @@ fn picture_place(local: vec3f, tan_half_fov: f32, half_fov: f32) -> vec3f {
     return vec3f(ndc, select(0.0, 1.0, valid));
 }
 
-// The pixel that a direction from the previous camera falls on, in the picture or not; z is 0 behind the camera.
+// Position in pixels of a direction in the picture of the previous frame, possibly outside it. z is 0 behind the
+// camera.
 fn previous_pixel(direction: vec3f) -> vec3f {
     let local = vec3f(
         dot(direction, frame.view.previous_right),
@@ -126,7 +131,8 @@ fn previous_pixel(direction: vec3f) -> vec3f {
     return vec3f((place.xy * vec2f(0.5, -0.5) + 0.5) * size, place.z);
 }
 
-// Whether there is a picture at a pixel: not beyond its edges, where a panorama has only two, nor the circle of a fisheye.
+// Whether the picture has a pixel: inside its four edges, in a panorama between its upper and lower edge, in a fisheye
+// inside its circle.
 fn in_picture(pixel: vec2i) -> bool {
     let size = vec2i(vec2u(frame.view.width, frame.view.height));
     if CAMERA == FISHEYE {
@@ -136,7 +142,7 @@ fn in_picture(pixel: vec2i) -> bool {
     return within.y && (within.x || CAMERA == EQUIRECT);
 }
 
-// The same motion across a picture, around a panorama the shorter way.
+// Motion across the picture, pixels. In a panorama, which wraps around, it is the shorter of both ways.
 fn shortest_way(motion: vec2f) -> vec2f {
     if CAMERA == EQUIRECT {
         let width = f32(frame.view.width);
@@ -145,8 +151,9 @@ fn shortest_way(motion: vec2f) -> vec2f {
     return motion;
 }
 
-// Width at distance 1 of the pixel that looks in a direction, along its wider side: what is narrower is lost along that. Away
-// from its axis a pinhole's pixels are narrower; near the poles a panorama's are as high as elsewhere.
+// Width at distance 1 of the pixel at a direction, along its wider side: features narrower than that are lost along it.
+// Pixels of a pinhole get narrower away from its axis. Pixels of a panorama get narrower toward its poles but keep
+// their height.
 fn pixel_width(direction: vec3f) -> f32 {
     switch CAMERA {
         case EQUIRECT: {

@@ -1,7 +1,7 @@
-// From scene-linear Rec. 709 radiance to display-encoded colour: color.rs for pictures that stay on the device.
+// Encoding of scene-linear Rec. 709 radiance for a display; color.rs does the same for pictures in memory.
 #import constants
 
-// The sRGB transfer function (IEC 61966-2-1).
+// sRGB transfer function (IEC 61966-2-1).
 fn encode_srgb(v: vec3f) -> vec3f {
     let x = saturate(v);
     return select(1.055 * pow(x, vec3f(1.0 / 2.4)) - 0.055, 12.92 * x, x <= vec3f(0.0031308));

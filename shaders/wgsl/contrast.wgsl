@@ -1,13 +1,14 @@
-// How unlike clouds look: what adaptive sampling and the validation of a history decide by.
+// Contrast between clouds: the criterion of adaptive sampling and of history validation.
 #import bindings
 
-// The light of a pixel of `clouds`: its brightest channel.
+// Brightness of a pixel of `clouds`: its largest channel.
 fn brightness(cloud: vec4f) -> f32 {
     return max(max(cloud.r, cloud.g), cloud.b);
 }
 
-// The contrast of clouds whose light and transmittance lie between a least and a most: the larger of the difference in
-// transmittance and that in light, which counts by what it is seen against, the brightest of them or the sky behind it.
+// Contrast of a group of pixels from the minima (x) and maxima (y) of their brightness and transmittance: the larger of
+// the difference in transmittance and the relative difference in brightness. The latter is relative to the brightest of
+// them or to the sky seen through them, whichever is brighter.
 fn contrast(light: vec2f, transmittance: vec2f) -> f32 {
     let against = max(light.y, transmittance.y * brightness(sky_light_uniform[0]));
     return max(transmittance.y - transmittance.x, (light.y - light.x) / max(against, 1e-30));

@@ -1,49 +1,52 @@
-// The cloud field: weather, height profile, base shape, detail (nubis2015, "density sampler"; thesis2018, "six steps");
-// or the user's grid in its place.
+// Cloud density: weather, height profile, base shape and detail (nubis2015, "density sampler"; thesis2018, "six
+// steps"), or the user's grid.
 #import math
 #import bindings
 #import volume
 #import chart
 
-// How many times the field was read by this invocation.
+// Density evaluations of this invocation.
 var<private> evaluations: u32 = 0u;
 
 struct LocalWeather {
     coverage: f32,
-    kind: f32, // 0 stratus, 0.5 stratocumulus, 1 cumulus
-    precipitation: f32, // turns cumulus into cumulonimbus
+    kind: f32, // cloud type: 0 stratus, 0.5 stratocumulus, 1 cumulus
+    precipitation: f32, // grows cumulus into cumulonimbus
 }
 
-// What a point can lie in.
+// Medium of a sample.
 const CLOUD = 0u;
-const UPPER_CLOUD = 1u; // of the deck above
-const RAIN = 2u; // below the base
+const UPPER_CLOUD = 1u; // upper deck
+const RAIN = 2u; // rain below the base of the lower deck
 
-// What the weather alone says of a point: enough to know that there is nothing.
+// Weather at a point, without noise: enough to skip clear air.
 struct WeatherSample {
-    limit: f32, // the base shape cannot exceed it; 0 where there is nothing
+    limit: f32, // upper bound of the base shape; 0 in clear air
     profile: f32,
     coverage: f32,
-    height: f32, // 0 at the base of the cloud, 1 at its top
+    height: f32, // fraction of the cloud's height: 0 at its base, 1 at its top
     precipitation: f32,
-    at: vec3f, // where the noises are read: on the chart without the wind's lean, the altitude as z, m; in a grid the point itself
+    // Position at which the noises are read, m: on the chart, without wind shear, and the altitude as z. In a grid the
+    // point itself.
+    at: vec3f,
     medium: u32,
-    thickness: f32, // of the cloud here from its base to its top, m
-    depth_share: f32, // share of that below the point
+    thickness: f32, // of the cloud at this place, from base to top, m
+    depth_share: f32, // fraction of the thickness below the point
 }
 
-// How the three parameters of a cloud meet the weather map (vsu2022: coverage shifts the map).
+// Local weather from a texel of the weather map. The parameters offset the map's values (vsu2022: coverage shifts the
+// map).
 fn weather_from_map(texel: vec3f) -> LocalWeather {
     let rain = texel.b * params.clouds.precipitation;
     let shifted = saturate(texel.r + 2.0 * params.clouds.coverage - 1.0);
     let kind = saturate(texel.g + 2.0 * params.clouds.type_ - 1.0);
-    // Where it rains, coverage is at least 0.7 (nubis2015; here 0.95, so that towers have no holes) and the type is pushed
-    // toward cumulonimbus, but a clear sky stays clear.
+    // Rain raises coverage to at least 0.7 in nubis2015, here to 0.95, as towers have holes otherwise. It also shifts
+    // the type toward cumulonimbus. A clear sky stays clear.
     let wet = 0.95 * rain * saturate(5.0 * params.clouds.coverage);
     return LocalWeather(max(shifted, wet), mix(kind, 1.0, rain), rain);
 }
 
-// The share of the cover that is left: none over the spot to keep clear, all from half a radius outside.
+// Factor on the coverage around the region kept clear: 0 within its radius, 1 from 1.5 times its radius on.
 fn kept_clear(place: vec2f) -> f32 {
     if !KEEP_CLEAR {
         return 1.0;
@@ -52,8 +55,9 @@ fn kept_clear(place: vec2f) -> f32 {
     return smoothstep(radius, 1.5 * radius, length(place - frame.sky.clear_at));
 }
 
-// Where the profile of a type rises from 0 to 1 and falls back, as fractions of the height: the weighted sum of three
-// (nubis2015, figure 4.10; vsu2022's gradients, equations 8 to 11), and where it rains that of cumulonimbus.
+// Height profile of a type: fractions of the height at which it rises from 0, reaches 1, starts to fall and reaches 0.
+// It is the weighted sum of three profiles (nubis2015, figure 4.10; vsu2022's gradients, equations 8 to 11), blended
+// with that of cumulonimbus by rain.
 fn profile_edges(kind: f32, rain: f32) -> vec4f {
     let stratus = saturate(1.0 - 2.0 * kind);
     let cumulus = saturate(2.0 * kind - 1.0);
@@ -69,7 +73,7 @@ fn profile_between(height: f32, edges: vec4f) -> f32 {
     return remap01(height, edges.x, edges.y) * (1.0 - smoothstep(edges.z, max(edges.w, edges.z + 1e-4), height));
 }
 
-// Density by height for a type: from its edges, or from the user's table.
+// Height profile at a height: from the four fractions, or from the user's table.
 fn height_profile(height: f32, kind: f32, rain: f32) -> f32 {
     if PROFILE_TABLE {
         let dry = profile_from_table(height, kind);
@@ -78,26 +82,26 @@ fn height_profile(height: f32, kind: f32, rain: f32) -> f32 {
     return profile_between(height, profile_edges(kind, rain));
 }
 
-// The first row of the table is the top of the clouds and the last their base, as in a picture; its first column is type
-// 0 and its last type 1.
+// Profile table. Row 0 is the top of the clouds, the last row their base; column 0 is type 0, the last column type 1.
 fn profile_from_table(height: f32, kind: f32) -> f32 {
     let size = vec2f(textureDimensions(profile_table));
     let uv = (vec2f(kind, 1.0 - height) * (size - 1.0) + 0.5) / size;
     return textureSampleLevel(profile_table, clamp_sampler, uv, 0.0).r;
 }
 
-// The base shape with coverage: what is left of it above 1 - coverage, lighter where there is little.
+// Base shape after coverage: values above 1 - coverage are stretched to [0, 1] and scaled by coverage, so that sparse
+// clouds are thin.
 fn with_coverage(base: f32, coverage: f32) -> f32 {
     return remap01(base, 1.0 - coverage, 1.0) * coverage;
 }
 
-// Detail eats into the shape: wispy at the base, billowy above.
+// Erosion of the base shape by detail: wispy at the base, billowy above.
 fn eroded(shape: f32, detail: f32, height: f32) -> f32 {
     let modifier = mix(detail, 1.0 - detail, saturate(10.0 * height));
     return select(0.0, remap01(shape, modifier * params.clouds.detail, 1.0), shape > 0.0);
 }
 
-// The weather at a point `p`, relative to the camera.
+// Weather at a point `p` relative to the eye.
 fn cloud_column(p: vec3f, altitude: f32) -> WeatherSample {
     evaluations += 1u;
     if VOLUME {
@@ -115,29 +119,30 @@ fn cloud_column(p: vec3f, altitude: f32) -> WeatherSample {
         column = rain_below(weather, at, altitude);
     }
     if UPPER {
-        // Within the height of that deck where there is nothing, too: the march reads how much it lacks of being cloud.
+        // Within the height range of the upper deck its sample replaces an empty one, even if it is empty itself: the
+        // march derives the length of a leap from how far the sample is from being cloud.
         let upper = upper_cloud_at(place, altitude, broad);
         let alone = altitude > frame.sky.lower_top && upper.height > 0.0 && upper.height < 1.0;
         if upper.limit > column.limit || (column.limit <= 0.0 && alone) {
             column = upper;
         }
-        // Of a deck that hardly shows there is what the shell has room for (`shell` in params.rs).
+        // Density ends at the shell, whose height range grows with the visibility of a deck (`shell` in params.rs).
         column.limit = select(0.0, column.limit, altitude >= frame.sky.shell_base && altitude <= frame.sky.shell_top);
     }
     return column;
 }
 
-// A place on the chart, without the wind's lean.
+// Position on the chart without wind shear.
 fn sheared(place: vec2f, altitude: f32) -> vec2f {
     let lean = (altitude - params.clouds.base) / (params.clouds.top - params.clouds.base) * params.wind.shear;
     return place - lean * frame.sky.wind_direction;
 }
 
-// Which way the larger map bends the smaller one, across and down: along no axis of their tiles.
+// Direction in which the large-scale map displaces the smaller one, in u and v: along no axis of the tiles.
 const BEND = vec2f(0.8, 0.6);
 
-// What a larger map shifts the weather by, and, in alpha, bends the smaller map by, so that it does not look like its own
-// repetition.
+// Large-scale weather: offsets of coverage, type and precipitation in rgb, displacement of the smaller map in alpha.
+// The displacement hides the smaller map's repetition.
 fn large_scale_weather(at: vec2f) -> vec4f {
     if LARGE_SCALE_WEATHER {
         let uv = frame.sky.broad_origin + vec2f(at.x, -at.y) / params.weather.broad_extent;
@@ -151,18 +156,18 @@ fn weather_uv(origin: vec2f, at: vec2f, broad: vec4f) -> vec2f {
     return select(uv, uv + frame.sky.broad_bend * broad.a * BEND, LARGE_SCALE_WEATHER);
 }
 
-// The weather map at a place `at` from where the eye is in its tile.
+// Texel of the weather map at `at`, m on the chart relative to the eye, whose place in the map is `origin`.
 fn weather_texel(origin: vec2f, at: vec2f, broad: vec4f) -> vec3f {
     let texel = textureSampleLevel(weather_map, weather_sampler, weather_uv(origin, at, broad), 0.0).rgb;
     return select(texel, saturate(texel + frame.sky.broad_scale * broad.rgb), LARGE_SCALE_WEATHER);
 }
 
-// How much of a cumulonimbus stands where it rains so much: its tower in the core of the rain, its anvil farther around.
+// Tower of a cumulonimbus: its completeness, 0 to 1, in the core of the rain. The anvil reaches farther out.
 fn tower(rain: f32) -> f32 {
     return smoothstep(TOWER.x, TOWER.y, rain);
 }
 
-// Altitude of the tops: where it rains they grow to those of cumulonimbus (nubis2015).
+// Altitude of the cloud tops, m: rain raises them to those of cumulonimbus (nubis2015).
 fn cloud_top(rain: f32) -> f32 {
     if RAINY {
         return mix(params.clouds.top, tallest(), tower(rain));
@@ -174,7 +179,8 @@ fn tallest() -> f32 {
     return max(params.clouds.top, params.clouds.cumulonimbus_top);
 }
 
-// Between which heights of the whole cloud its anvil rises to full strength and falls back.
+// Height profile of the anvil, in fractions of the height of a cumulonimbus: start and end of its rise, start and end
+// of its fall.
 const ANVIL = vec4f(0.64, 0.80, 0.88, 1.0);
 
 fn anvil(rain: f32, altitude: f32) -> f32 {
@@ -183,12 +189,12 @@ fn anvil(rain: f32, altitude: f32) -> f32 {
     return smoothstep(edge, edge + 0.3, rain) * profile_between(height, ANVIL);
 }
 
-// The cloud at a place and altitude.
+// Lower deck at a chart position and altitude.
 fn cloud_in(weather: LocalWeather, at: vec2f, altitude: f32) -> WeatherSample {
     let rain = weather.precipitation;
     let base = params.clouds.base;
     let height = (altitude - base) / (cloud_top(rain) - base);
-    // The noise is at most 1: where the profile alone does not rise above 1 - coverage, nothing does.
+    // Bound of the base shape: noise is at most 1, so there is no cloud where the profile alone is below 1 - coverage.
     let inside = height > 0.0 && height < 1.0;
     var column = WeatherSample(0.0, 0.0, weather.coverage, height, rain, vec3f(at, altitude), CLOUD, 0.0, 0.0);
     column.profile = select(0.0, height_profile(height, weather.kind, tower(rain)), inside);
@@ -203,7 +209,8 @@ fn cloud_in(weather: LocalWeather, at: vec2f, altitude: f32) -> WeatherSample {
     return column;
 }
 
-// From where to where its profile lets a cloud reach: to where it falls below what the coverage asks for.
+// Vertical extent of the cloud: from the start of the profile to the height at which the profile falls below
+// 1 - coverage.
 fn with_extent(given: WeatherSample, kind: f32, rain: f32, whole: f32) -> WeatherSample {
     var column = given;
     var edges = profile_edges(kind, rain);
@@ -216,7 +223,7 @@ fn with_extent(given: WeatherSample, kind: f32, rain: f32, whole: f32) -> Weathe
     return column;
 }
 
-// The deck above, with a weather and a wind of its own.
+// Upper deck, with its own weather, wind and scale.
 fn upper_cloud_at(place: vec2f, altitude: f32, broad: vec4f) -> WeatherSample {
     let base = params.upper_clouds.base;
     let height = (altitude - base) / (params.upper_clouds.top - base);
@@ -232,27 +239,28 @@ fn upper_cloud_at(place: vec2f, altitude: f32, broad: vec4f) -> WeatherSample {
     return with_extent(column, kind, 0.0, params.upper_clouds.top - base);
 }
 
-// Rain below the base, thinned by the air that it falls through.
+// Rain below the base. Evaporation thins it on its way down.
 fn rain_below(weather: LocalWeather, at: vec2f, altitude: f32) -> WeatherSample {
     let height = altitude / params.clouds.base;
     let wet = frame.sky.rain_reach * weather.precipitation * weather.coverage;
     let limit = select(0.0, saturate(2.0 * wet - 0.6 + 0.6 * height), altitude > 0.0);
     let streak = vec3f(at, altitude / RAIN_STRETCH + frame.sky.rain_fall);
-    // All of the cloud is above it.
+    // The whole cloud lies above the rain.
     let thickness = cloud_top(weather.precipitation) - params.clouds.base;
     return WeatherSample(limit, 1.0, 1.0, 0.0, weather.precipitation, streak, RAIN, thickness, 0.0);
 }
 
-// The base shape, before detail: cheap, and never smaller than the density.
+// Base shape, without detail: cheap to evaluate, and an upper bound of the density.
 fn cloud_shape(column: WeatherSample) -> f32 {
     return shape_in(column, base_noise(column));
 }
 
-// The noise that shapes the clouds at a point; in the user's grid its density. It has no levels of detail: clouds are where it
-// passes a level, and means pass that less often. Seen straight from above, of a cover of 0.305 texels of 80 m left 0.298, 160 m
-// 0.285, 330 m 0.263 and 650 m 0.228, so that what there is depended on the size of pictures and steps; and pictures of 160x90 in
-// `draft` erred by 0.19, 0.14 and 0.25 where they err by 0.15, 0.13 and 0.21 (`fair_weather`, `stratocumulus`, `above`), in the
-// same time. Of what is smaller than a pixel several rays find the mean (passes/march).
+// Base-shape noise at a point; in the user's grid its density. It has no mip levels: clouds are where the noise exceeds
+// a threshold, and averages exceed it less often. Of a cover of 0.305 seen straight from above, mips with texels of
+// 80 m left 0.298, of 160 m 0.285, of 330 m 0.263 and of 650 m 0.228; the cover depended on resolution and step length.
+// With mips, pictures of 160x90 in `draft` had errors of 0.19, 0.14 and 0.25; without, 0.15, 0.13 and 0.21
+// (`fair_weather`, `stratocumulus`, `above`), in the same time. Pixels wider than clouds are averaged over several rays
+// instead (passes/march).
 fn base_noise(column: WeatherSample) -> f32 {
     if VOLUME {
         return volume_density(column.at);
@@ -262,7 +270,7 @@ fn base_noise(column: WeatherSample) -> f32 {
     return textureSampleLevel(shape_noise, repeat_sampler, origin + column.at / params.clouds.shape_scale, 0.0).r;
 }
 
-// The base shape where that noise is known.
+// Base shape for a value of the base-shape noise.
 fn shape_in(column: WeatherSample, noise: f32) -> f32 {
     if VOLUME {
         return select(0.0, noise, column.limit > 0.0);
@@ -274,12 +282,12 @@ fn shape_in(column: WeatherSample, noise: f32) -> f32 {
     return select(0.0, shape, column.limit > 0.0);
 }
 
-// A width, where the noises of the upper deck are scaled.
+// Width in the coordinates of the noises, which are scaled in the upper deck.
 fn scaled(width: f32, upper: bool) -> f32 {
     return width / select(1.0, params.upper_clouds.scale, upper);
 }
 
-// The density at a point whose shape is known. `width` is the size of what one sample stands for, in metres.
+// Density at a point of known base shape. `width` is the footprint of the sample, m.
 fn cloud_density(column: WeatherSample, shape: f32, width: f32) -> f32 {
     if VOLUME {
         return shape;
@@ -294,15 +302,15 @@ fn cloud_density(column: WeatherSample, shape: f32, width: f32) -> f32 {
     return with_share(column, eroded(shape, detail, column.height), shape);
 }
 
-// What erodes the edges, where one sample stands for so many of its tiles: the detail, and the same again, smaller, without
-// which a cloud that is near has nothing finer than the detail's texels of 13 m (passes/noise). One read for both: with two,
-// the march of `fair_weather` took a seventh longer.
+// Detail noise that erodes the edges, at a footprint of `tiles` tiles. The texture is the sum of the detail and its
+// finer copy (passes/noise). Without the copy, near clouds have nothing finer than the detail's texels of 13 m. One
+// read serves both: with two, the march of `fair_weather` took a seventh longer.
 fn detail_at(at: vec3f, tiles: f32) -> f32 {
     let texels = tiles * f32(DETAIL_SIZE) * f32(FINER);
     return textureSampleLevel(detail_noise, repeat_sampler, at, log2(max(texels, 1.0))).r;
 }
 
-// The density of a medium as a share of `extinction`: of cloud that has been eroded, or of rain, which is not.
+// Density of a medium as a fraction of `extinction`. Clouds are eroded by detail, rain is not.
 fn with_share(column: WeatherSample, cloud: f32, rain: f32) -> f32 {
     if !(UPPER || RAIN_SHAFTS) {
         return cloud;
@@ -311,13 +319,13 @@ fn with_share(column: WeatherSample, cloud: f32, rain: f32) -> f32 {
     return select(density, rain * frame.sky.rain_share, column.medium == RAIN);
 }
 
-// The density with everything read.
+// Density at a point, with every read.
 fn cloud_density_at(p: vec3f, altitude: f32, width: f32) -> f32 {
     let column = cloud_column(p, altitude);
     return cloud_density(column, cloud_shape(column), width);
 }
 
-// The density without reading the detail: eroded by its mean instead, so that light samples keep their mean.
+// Density without the read of the detail: erosion by the mean of the detail keeps the mean of light samples.
 fn cloud_density_cheap(p: vec3f, altitude: f32) -> f32 {
     let column = cloud_column(p, altitude);
     let shape = cloud_shape(column);

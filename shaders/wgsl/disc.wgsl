@@ -1,24 +1,24 @@
-// The discs of sun and moon: the share of its light in each pixel, exact however wide pixels are. A point of the sky beside
-// its middle is a place in the plane that touches the sky there (a gnomonic projection, in which great circles are straight), in
-// radii of the disc. There a pixel is a polygon, and its share of a round disc follows from its edges alone (Green's theorem),
-// so that the shares of neighbours add up, whatever is rounded on the edge between them.
+// Discs of sun and moon: the fraction of the disc's light in each pixel, exact at any pixel size. Points of the sky
+// project to the plane that touches the sphere of directions at the disc's centre (gnomonic projection), in disc radii;
+// great circles become straight lines. A pixel is a polygon in that plane, and its fraction of the disc is a sum over
+// its edges (Green's theorem). Neighbouring pixels share edges, so that their fractions add up to 1 despite rounding.
 #import math
 #import camera
 #import atmosphere
 #import aerial
 
-// Exponents of the cosine at the sun's surface by which its limb darkens, at 680, 550 and 440 nm (Hestroffer and Magnan
+// Limb darkening of the sun: exponents of the cosine at its surface, at 680, 550 and 440 nm (Hestroffer and Magnan
 // 1998, after Hillaire 2016).
 const LIMB = vec3f(0.397, 0.503, 0.652);
 
 struct Disc {
     direction: vec3f,
     radius: f32,
-    bounds: vec4f, // left, top, right and bottom of a part of the picture that holds it, pixels
+    bounds: vec4f, // left, top, right and bottom of a rectangle that contains it, pixels
     irradiance: vec3f,
     limb: vec3f,
     bright: vec3f, // unit vector to its bright side
-    phase: f32, // cosine of the angle at it between its light and the eye: 1 is all lit
+    phase: f32, // cosine of the phase angle between light source and eye at the disc: 1 is fully lit
 }
 
 fn sun_disc() -> Disc {
@@ -26,7 +26,7 @@ fn sun_disc() -> Disc {
     return Disc(at, SUN_RADIUS, frame.view.sun_bounds, params.sun.irradiance, LIMB, perpendicular(at), 1.0);
 }
 
-// A full moon is as bright at its limb as in its middle.
+// The moon has no limb darkening: a full moon is as bright at its limb as at its centre.
 fn moon_disc() -> Disc {
     let bounds = frame.view.moon_bounds;
     let light = frame.sky.moon_light;
@@ -34,10 +34,10 @@ fn moon_disc() -> Disc {
     return Disc(frame.sky.moon_direction, MOON_RADIUS, bounds, light, vec3f(0.0), frame.sky.moon_bright, phase);
 }
 
-// Radiance that a pixel gets of the discs, on average, through the air.
+// Mean radiance of the discs in a pixel, through the air.
 fn discs_in_pixel(pixel: vec2u) -> vec3f {
     var light = vec3f(0.0);
-    // A loop: a kernel holds a function once for each place that calls it, and this one takes seconds to compile.
+    // The loop has one call of `disc_in_pixel`. Compilers inline every call, and the function takes seconds to compile.
     for (var k = 0u; k < 2u; k++) {
         var disc = sun_disc();
         if k == 1u {
@@ -46,13 +46,13 @@ fn discs_in_pixel(pixel: vec2u) -> vec3f {
         let visible = k == 1u || params.sun.visible > 0u;
         light += select(vec3f(0.0), disc_in_pixel(disc, vec2f(pixel)), visible);
     }
-    // Beside a disc rounding may leave less than nothing.
+    // Rounding may give a negative sum next to a disc.
     return max(light, vec3f(0.0)) / pixel_solid_angle(vec2f(pixel));
 }
 
-// What a pixel gets of a disc: irradiance.
+// Irradiance of a disc in a pixel.
 fn disc_in_pixel(disc: Disc, corner: vec2f) -> vec3f {
-    // A panorama goes on beyond its sides.
+    // A panorama wraps around at its sides.
     let rounds = select(0, 1, CAMERA == EQUIRECT);
     let plane = disc_plane(disc);
     var share = vec3f(0.0);
@@ -67,8 +67,8 @@ fn disc_in_pixel(disc: Disc, corner: vec2f) -> vec3f {
     return disc.irradiance * share;
 }
 
-// The same as a share, of a part of a pixel that is no larger than the disc is: seen through the air in so many pieces, for it
-// dims the lower half of a disc at the horizon more than the upper.
+// Pieces, along each side of the disc's bounds, in which its transmittance is sampled. Air dims the lower half of a
+// disc at the horizon more than the upper half.
 const PIECES_ACROSS = 5.0;
 
 fn disc_in_part(disc: Disc, plane: DiscPlane, low: vec2f, high: vec2f) -> vec3f {
@@ -87,7 +87,7 @@ fn disc_in_part(disc: Disc, plane: DiscPlane, low: vec2f, high: vec2f) -> vec3f 
     return share;
 }
 
-// Of the air, as if there were no ground: what it hides has been cut off.
+// Transmittance of the air toward a disc, without the ground: the polygon is already clipped at the horizon.
 fn disc_transmittance(direction: vec3f) -> vec3f {
     if !AIR {
         return vec3f(1.0);
@@ -98,15 +98,15 @@ fn disc_transmittance(direction: vec3f) -> vec3f {
     return select(vec3f(1.0), through, way.length > 0.0);
 }
 
-// The plane that touches the sky in the middle of a disc: its axes as local directions.
+// Tangent plane at the centre of a disc. Its axes are local directions (right, up, forward).
 struct DiscPlane {
-    middle: vec3f, // of the length of local directions (camera.wgsl)
-    toward: vec3f, // the same, one long
+    middle: vec3f, // local direction to the centre, with the length of `local_direction` (camera.wgsl)
+    toward: vec3f, // unit local direction to the centre
     right: vec3f,
     up: vec3f, // away from the ground
     radius: f32,
     bright: vec2f, // unit vector to the bright side
-    horizon: f32, // where the ground begins, radii up
+    horizon: f32, // height of the horizon in the plane, radii
 }
 
 fn disc_plane(disc: Disc) -> DiscPlane {
@@ -126,16 +126,19 @@ fn to_local(direction: vec3f) -> vec3f {
     return vec3f(dot(direction, frame.view.right), dot(direction, frame.view.up), dot(direction, frame.view.forward));
 }
 
-// Where in the plane the sky of a place in the picture is. The difference comes first, or narrow views lose their digits.
+// Projection of a picture position to the plane, in radii. The subtraction precedes the dot products: narrow views lose
+// their digits otherwise.
 fn disc_place(plane: DiscPlane, pixel: vec2f) -> vec2f {
     let local = local_direction(pixel).xyz;
     let beside = local - plane.middle;
-    return vec2f(dot(beside, plane.right), dot(beside, plane.up)) / (max(dot(local, plane.toward), 1e-3) * plane.radius);
+    return vec2f(dot(beside, plane.right), dot(beside, plane.up))
+        / (max(dot(local, plane.toward), 1e-3) * plane.radius);
 }
 
-// Edges of pixels are straight in the plane for a pinhole; a panorama's and a fisheye's are bent, and have so many corners a side.
+// Corners per side of a pixel's polygon. A pinhole's pixels have straight edges in the plane; those of panorama and
+// fisheye are curved.
 const CORNERS_A_SIDE = 3u;
-// With those that two cuts add.
+// Corners of a polygon after two cuts.
 const MOST_CORNERS = 4u * CORNERS_A_SIDE + 4u;
 
 struct Polygon {
@@ -143,7 +146,7 @@ struct Polygon {
     count: u32,
 }
 
-// A part of the picture as a polygon in the plane, counterclockwise.
+// Polygon in the plane of a rectangle of the picture, counterclockwise.
 fn pixel_polygon(plane: DiscPlane, low: vec2f, high: vec2f) -> Polygon {
     let a_side = select(1u, CORNERS_A_SIDE, CAMERA == EQUIRECT || CAMERA == FISHEYE);
     var polygon: Polygon;
@@ -157,13 +160,13 @@ fn pixel_polygon(plane: DiscPlane, low: vec2f, high: vec2f) -> Polygon {
             case 2u: { at = vec2f(1.0 - s, 0.0); }
             default: { at = vec2f(0.0, s); }
         }
-        // Written so that the ends are exact.
+        // Interpolation in this form is exact at both ends.
         polygon.corners[i] = disc_place(plane, (1.0 - at) * low + at * high);
     }
     return polygon;
 }
 
-// What of a polygon lies beyond a line, on the side of its normal.
+// Part of a polygon beyond a line, on the side of its normal.
 fn clipped(given: Polygon, normal: vec2f, offset: f32) -> Polygon {
     var polygon: Polygon;
     polygon.count = 0u;
@@ -183,10 +186,12 @@ fn clipped(given: Polygon, normal: vec2f, offset: f32) -> Polygon {
     return polygon;
 }
 
-// The share of the light of a disc in a polygon. It falls toward the limb as (1 - r^2)^(exponent - 1), so that 1 - (1 -
-// r^2)^exponent of it is within r, and the share is the integral of that over the angle around the middle, along the edges.
+// Fraction of a disc's light in a polygon. Brightness falls toward the limb as (1 - r^2)^(exponent - 1), so that the
+// light within radius r is 1 - (1 - r^2)^exponent. The fraction is the integral of that over the polar angle along the
+// edges.
 fn polygon_share(polygon: Polygon, exponent: vec3f) -> vec3f {
-    // What lies beside the middle does not go round it, and then all of it may be left out, which is exact outside the disc.
+    // A polygon that does not surround the centre: the constant 1 integrates to 0 and is left out. This is exact
+    // outside the disc.
     var size = 0.0;
     for (var i = 1u; i < polygon.count; i++) {
         size = max(size, distance(polygon.corners[i], polygon.corners[0]));
@@ -199,8 +204,9 @@ fn polygon_share(polygon: Polygon, exponent: vec3f) -> vec3f {
     return sum / (2.0 * PI);
 }
 
-// The same of what is lit of a ball, on average as bright everywhere: the half of its disc toward the light, and beyond that, or
-// less, half an ellipse, which is a disc that is squeezed. Of a full one all of its disc.
+// Fraction of the light of a partly lit ball in a polygon. The lit part has uniform radiance: it is the half disc
+// toward the light, plus (gibbous) or minus (crescent) half an ellipse, which is a squeezed disc. A fully lit ball is
+// one disc.
 fn lit_share(region: Polygon, bright: vec2f, phase: f32, exponent: vec3f) -> vec3f {
     let full = phase >= 1.0;
     let narrow = max(abs(phase), 1e-3);
@@ -217,7 +223,7 @@ fn lit_share(region: Polygon, bright: vec2f, phase: f32, exponent: vec3f) -> vec
     return select(sum / max(0.5 * (1.0 + phase), 1e-4), sum, full);
 }
 
-// Places and weights of Gauss and Legendre's rule with four points, from -1 to 1.
+// Nodes and weights of the four-point Gauss-Legendre rule on [-1, 1].
 const GAUSS_AT = vec4f(-0.8611363116, -0.3399810436, 0.3399810436, 0.8611363116);
 const GAUSS_WEIGHT = vec4f(0.3478548451, 0.6521451549, 0.6521451549, 0.3478548451);
 
@@ -228,7 +234,7 @@ fn edge_share(a: vec2f, b: vec2f, exponent: vec3f, beside: bool) -> vec3f {
     }
     let along = (b - a) / long;
     let away = a.x * along.y - a.y * along.x;
-    // The part of it in the disc.
+    // Part of the edge inside the disc.
     let half_chord = sqrt(max(1.0 - away * away, 0.0));
     let s = clamp(vec2f(dot(a, along), dot(b, along)), vec2f(-half_chord), vec2f(half_chord));
     let foot = away * vec2f(along.y, -along.x);
@@ -237,7 +243,7 @@ fn edge_share(a: vec2f, b: vec2f, exponent: vec3f, beside: bool) -> vec3f {
         let at = mix(s.x, s.y, 0.5 + 0.5 * GAUSS_AT[i]);
         let r2 = min(away * away + at * at, 1.0);
         let outside = pow(vec3f(1.0 - r2), exponent);
-        // (1 - (1 - r^2)^exponent) / r^2 loses its digits in the middle.
+        // Series near the centre, where (1 - (1 - r^2)^exponent) / r^2 cancels.
         let inside = select((1.0 - outside) / max(r2, 1e-2), exponent * (1.0 - 0.5 * (exponent - 1.0) * r2), r2 < 1e-2);
         sum += GAUSS_WEIGHT[i] * select(inside, -outside / max(r2, 1e-12), beside);
     }
@@ -248,7 +254,7 @@ fn edge_share(a: vec2f, b: vec2f, exponent: vec3f, beside: bool) -> vec3f {
     return sum;
 }
 
-// The angle from one place to another around the middle.
+// Angle between two points about the centre, radians.
 fn turn(a: vec2f, b: vec2f) -> f32 {
     return atan2(a.x * b.y - a.y * b.x, dot(a, b) + 1e-20);
 }

@@ -1,4 +1,4 @@
-// The phase function of real droplets: a fit of two lobes, and Mie's own as a table.
+// Phase function of cloud droplets: a two-lobe fit, and a table of Mie scattering.
 #import bindings
 #import math
 #import phase
@@ -11,23 +11,24 @@ fn droplet_phase(one_minus_mu: f32) -> f32 {
     return droplet_fit(one_minus_mu, 1.0);
 }
 
-// Jendersie and d'Eon 2023: Henyey and Greenstein's forward peak and Draine's body. With a `peak` less than 1, each lobe is
-// as much less one-sided: at 0, all directions are alike.
+// Fit of Jendersie and d'Eon 2023: a forward peak of Henyey and Greenstein and a body of Draine. A `peak` below 1
+// reduces the anisotropy of both lobes; at 0 scattering is isotropic.
 fn droplet_fit(one_minus_mu: f32, peak: f32) -> f32 {
     let d = frame.sky.droplet;
     let forward = henyey_greenstein(one_minus_mu, peak * d.x);
     return mix(forward, draine(one_minus_mu, peak * d.y, peak * d.z), d.w);
 }
 
-// The table is loaded, not filtered: in half floats a forward peak would lose its digits, and its integral all of them.
+// The table is f32 and loaded, not filtered: half floats lose the digits of a forward peak, and all digits of its
+// integral.
 fn phase_entry(i: u32) -> vec2f {
     return textureLoad(phase_table, vec2u(i, 0u), 0).rg;
 }
 
-// The angle of entry `s` of 0 to 1 is pi sin^2(s pi / 2): entries are dense at both ends, where peak and glory are.
+// Angle of entry `s` in [0, 1]: pi sin^2(s pi / 2). Entries are dense at both ends, at forward peak and glory.
 fn mie_phase(one_minus_mu: f32) -> f32 {
     let last = textureDimensions(phase_table).x - 1u;
-    // atan2 keeps the digits of small angles, which acos(1 - one_minus_mu) has lost.
+    // atan2 keeps the digits of small angles; acos(1 - one_minus_mu) has lost them.
     let angle = 2.0 * atan2(sqrt(one_minus_mu), sqrt(max(2.0 - one_minus_mu, 0.0)));
     let share = saturate(angle / PI);
     let x = 2.0 / PI * atan2(sqrt(share), sqrt(1.0 - share)) * f32(last);
@@ -35,15 +36,15 @@ fn mie_phase(one_minus_mu: f32) -> f32 {
     return mix(phase_entry(i).x, phase_entry(i + 1u).x, saturate(x - f32(i)));
 }
 
-// 1 minus the cosine at an entry.
+// 1 minus the cosine of the scattering angle of an entry.
 fn phase_entry_cosine(i: u32) -> f32 {
     let s = sin(0.5 * PI * f32(i) / f32(textureDimensions(phase_table).x - 1u));
     let half = sin(0.5 * PI * s * s);
     return 2.0 * half * half;
 }
 
-// 1 minus the cosine of a scattering by `droplet_phase` for random numbers, of which the second is free for the angle
-// around, and what its light is to be multiplied with.
+// Sample of `droplet_phase`: 1 minus the cosine of the scattering angle, and the weight of the sample. The second
+// random number stays free for the azimuth.
 fn droplet_sample(u: vec2f) -> vec2f {
     if PHASE == PHASE_MIE {
         return mie_sample(u.x);
@@ -51,8 +52,8 @@ fn droplet_sample(u: vec2f) -> vec2f {
     return vec2f(droplet_fit_sample(u), 1.0);
 }
 
-// One lobe or the other. Draine's is Henyey and Greenstein's times 1 + alpha mu^2, so that at least a third of those trials
-// is accepted; 1e-9 of the samples find none and take the last.
+// Rejection sampling of the two lobes. Draine's function is Henyey and Greenstein's times 1 + alpha mu^2, so that at
+// least a third of the trials is accepted. 1e-9 of the samples reject all trials and take the last.
 fn droplet_fit_sample(u: vec2f) -> f32 {
     const MOST_TRIALS = 50u;
     let seed = bitcast<vec2u>(u);
@@ -73,8 +74,8 @@ fn droplet_fit_sample(u: vec2f) -> f32 {
     return one_minus_mu;
 }
 
-// 1 minus the cosine of a scattering by the table for a random number, evenly between two entries, and the share of the
-// function in what that makes of it.
+// Sample of the table, uniform in mu between two entries: 1 minus the cosine of the scattering angle, and the ratio of
+// the phase function to the probability density of the sample.
 fn mie_sample(u: f32) -> vec2f {
     var low = 0u;
     var high = textureDimensions(phase_table).x - 1u;

@@ -1,10 +1,10 @@
-// Perlin, simplex and Worley noise that tile, and their FBMs. Coordinates are in tiles: [0, 1) is one period.
+// Tileable Perlin, simplex and Worley noise, and their FBMs. Coordinates are in tiles: [0, 1) is one period.
 #import math
 #import random
 
-const SIMPLEX_GAIN = 7.0; // standard deviations: 0.19 of `perlin`, 0.0275 of `simplex` without it
+const SIMPLEX_GAIN = 7.0; // standard deviation: `perlin` has 0.19, `simplex` without gain 0.0275
 
-// Perlin noise of `period` cells a tile, about -1 to 1 (Perlin 2002: quintic fade).
+// Perlin noise of `period` cells per tile, in about [-1, 1] (Perlin 2002: quintic fade).
 fn perlin(p: vec3f, period: u32, salt: u32) -> f32 {
     let q = fract(p) * f32(period);
     let cell = vec3i(floor(q));
@@ -25,7 +25,7 @@ fn perlin(p: vec3f, period: u32, salt: u32) -> f32 {
     return mix(y.x, y.y, w.z);
 }
 
-// FBM of Perlin noise from `period` cells a tile up, mapped to [0, 1] with mean 0.5 and standard deviation 0.2.
+// FBM of Perlin noise from `period` cells per tile up, mapped to [0, 1] with mean 0.5 and standard deviation 0.2.
 fn perlin_fbm(p: vec3f, period: u32, octaves: u32, salt: u32) -> f32 {
     var sum = 0.0;
     var amplitude = 1.0;
@@ -38,20 +38,20 @@ fn perlin_fbm(p: vec3f, period: u32, octaves: u32, salt: u32) -> f32 {
     return saturate(0.5 + 0.85 * sum / total);
 }
 
-// Simplex noise in the plane (Perlin 2001; made to tile as Gustavson and McEwan do, "Tiling simplex noise and flow noise",
-// JCGT 2022): `period` triangles across a tile, and as many rows of them as make them about equilateral. Each row is
-// shifted by half a triangle against the next, so their number is even. Its variance is that of `perlin`.
+// Simplex noise in the plane (Perlin 2001), tileable after Gustavson and McEwan ("Tiling simplex noise and flow noise",
+// JCGT 2022). A tile is `period` triangles wide and has as many rows as make the triangles about equilateral. Rows are
+// shifted by half a triangle against each other, so that their number is even. The variance is that of `perlin`.
 fn simplex(p: vec2f, period: u32, salt: u32) -> f32 {
     let rows = 2u * max(u32(round(f32(period) / sqrt(3.0))), 1u);
     let q = fract(p) * vec2f(f32(period), f32(rows));
-    // Where the lattice is square, with the triangles as its halves.
+    // Skewed coordinates, in which the lattice is square and each triangle is half a square.
     let skewed = vec2f(q.x + 0.5 * q.y, q.y);
     let cell = floor(skewed);
     let f = skewed - cell;
     var sum = 0.0;
     for (var i = 0; i < 3; i++) {
         let o = select(select(vec2f(0.0, 1.0), vec2f(1.0, 0.0), f.x > f.y), vec2f(f32(i / 2)), i != 1);
-        // From the corner, in sides of a triangle; a corner's weight ends where its six triangles do.
+        // Offset from the corner, in triangle sides. A corner's weight falls to 0 at the rim of its six triangles.
         let apart = vec2f(f.x - o.x - 0.5 * (f.y - o.y), 0.5 * sqrt(3.0) * (f.y - o.y));
         let corner = vec2u(cell + o);
         let wrapped = vec3u((corner.x - corner.y / 2u) % period, corner.y % rows, 0u);
@@ -62,7 +62,7 @@ fn simplex(p: vec2f, period: u32, salt: u32) -> f32 {
     return SIMPLEX_GAIN * sum;
 }
 
-// FBM of simplex noise, as `perlin_fbm`.
+// FBM of simplex noise, with the parameters of `perlin_fbm`.
 fn simplex_fbm(p: vec2f, period: u32, octaves: u32, salt: u32) -> f32 {
     var sum = 0.0;
     var amplitude = 1.0;
@@ -75,7 +75,7 @@ fn simplex_fbm(p: vec2f, period: u32, octaves: u32, salt: u32) -> f32 {
     return saturate(0.5 + 0.85 * sum / total);
 }
 
-// Inverted Worley noise (Worley 1996): 1 at the feature points, falling to 0 one cell away; blobs are bright.
+// Inverted Worley noise (Worley 1996): 1 at the feature points, falling to 0 at a distance of one cell.
 fn worley(p: vec3f, period: u32, salt: u32) -> f32 {
     let q = fract(p) * f32(period);
     let cell = vec3i(floor(q));
@@ -93,13 +93,14 @@ fn worley(p: vec3f, period: u32, salt: u32) -> f32 {
     return 1.0 - sqrt(nearest);
 }
 
-// Perlin noise with the billows of Worley noise: nubis2015 raises the old minimum of the Perlin range to a Worley FBM.
-// `worley` is inverted, so it is the dark borders of its cells that carve, and round shapes stay.
+// Perlin-Worley noise: a Worley FBM raises the old minimum of the Perlin noise's remap (nubis2015). `worley` is
+// inverted, so that the dark borders of its cells carve the noise and round shapes stay.
 fn perlin_worley(perlin: f32, worley: f32) -> f32 {
     return remap01(perlin, 1.0 - worley, 1.0);
 }
 
-// nubis2015: the low-frequency FBM lowers the old minimum, which raises the shape.
+// Base shape of four noises: the low-frequency FBM lowers the old minimum of the remap, which raises the shape
+// (nubis2015).
 fn base_shape(noise: vec4f) -> f32 {
     let low = 1.0 - fbm3(noise.gba);
     return (noise.r + low) / (1.0 + low);

@@ -1,16 +1,17 @@
-// How much sun reaches the ground around the eye, and the air over it, as it is baked: a stack of levels, each twice as wide
-// and coarse as the one before (passes/shadow). Transmittance is what is interpolated. A texel's four numbers are those of the
-// sun's ray to that place on the ground: where it leaves the clouds, and at a quarter, a half and three quarters of their height.
+// Shadow clipmap: transmittance of the marched clouds toward the sun, for the ground around the eye and the air over
+// it. Its levels are stacked in one texture, each twice as wide and coarse as the one before (passes/shadow). The four
+// channels of a texel hold the transmittance on the sun ray to its place on the ground: below all clouds, and at a
+// quarter, a half and three quarters of their height range. Reads interpolate transmittance, not optical depth.
 #import bindings
 #import shell
 #import high_layer
 
-// The side of a texel of a level, m.
+// Side of a texel of a level, m.
 fn shadow_texel(level: u32) -> f32 {
     return frame.sky.shadow_texel * f32(1u << level);
 }
 
-// The ground under, or over, a place beside the eye.
+// Point of the planet's surface at a horizontal offset `xy` from the eye, relative to the eye.
 fn ground_place(xy: vec2f) -> vec3f {
     let centre = frame.view.zenith * frame.view.centre_distance;
     let across = length(centre.xy + xy);
@@ -19,12 +20,12 @@ fn ground_place(xy: vec2f) -> vec3f {
     return vec3f(xy, select(-up, up, centre.z >= 0.0) - centre.z);
 }
 
-// How far a level reaches from its middle, m: to half a texel from its rim.
+// Half width of a level up to the centre of its outermost texels, m.
 fn shadow_reach(level: u32) -> f32 {
     return (0.5 * f32(SHADOW_SIDE) - 0.5) * shadow_texel(level);
 }
 
-// A place from the middle of the levels, as one of them has it: half a texel from those above and below.
+// Sample of a level at `q`, m from the centre of the clipmap. Clamping to texel centres keeps the stacked levels apart.
 fn shadow_in_level(q: vec2f, level: u32) -> vec4f {
     let side = f32(SHADOW_SIDE);
     let texel = clamp(q / shadow_texel(level) + 0.5 * side, vec2f(0.5), vec2f(side - 0.5));
@@ -32,22 +33,22 @@ fn shadow_in_level(q: vec2f, level: u32) -> vec4f {
     return textureSampleLevel(ground_shadow, clamp_sampler, at / vec2f(side, side * f32(SHADOW_LEVELS)), 0.0);
 }
 
-// The finest level that holds a place and whose texels are no finer than `fine` metres. Levels go over into the next toward
-// their rims, so that one read does.
+// Finest level that contains `q` and whose texels have at least `fine` metres. Each level blends into the next toward
+// its rim, so that one read suffices.
 fn shadow_level(q: vec2f, fine: f32) -> u32 {
     let away = max(abs(q.x), abs(q.y)) / shadow_reach(0u);
     let level = max(ceil(log2(max(away, 1e-6))), round(log2(max(fine / shadow_texel(0u), 1e-6))));
     return u32(clamp(level, 0.0, f32(SHADOW_LEVELS - 1u)));
 }
 
-// How much sun reaches a point on the ground through the marched clouds.
+// Transmittance of the marched clouds toward the sun at a point of the ground.
 fn baked_ground_sun(p: vec3f) -> f32 {
     let q = p.xy + frame.sky.shadow_eye;
     return shadow_in_level(q, shadow_level(q, 0.0)).x;
 }
 
-// How much sun reaches a point in the air through them, as its ray goes on to the ground; beyond the levels, and where the ray
-// misses the ground, that is their mean.
+// Transmittance of the marched clouds toward the sun at a point in the air, read where its sun ray, extended downwards,
+// meets the ground. Points beyond the clipmap, and sun rays that miss the ground, have the mean of the last level.
 fn baked_air_sun(p: vec3f, altitude: f32, mu_sun: f32, fine: f32) -> f32 {
     let radius = params.atmosphere.planet_radius;
     let down = crossing(-(radius + altitude) * mu_sun, max(altitude, 0.0) * (2.0 * radius + altitude));
@@ -58,7 +59,7 @@ fn baked_air_sun(p: vec3f, altitude: f32, mu_sun: f32, fine: f32) -> f32 {
     return dot(saturate(1.0 - abs(max(x, 0.0) - vec4f(0.0, 1.0, 2.0, 3.0))), baked) + saturate(x - 3.0);
 }
 
-// A height from the lowest marched clouds, 0, to the highest, 1.
+// Height of a point in the range of the marched clouds: 0 at the lowest, 1 at the highest.
 fn height_among_clouds(p: vec3f, altitude: f32) -> f32 {
     if VOLUME {
         return (p.z - frame.sky.volume_low.z) / (frame.sky.volume_high.z - frame.sky.volume_low.z);
@@ -66,12 +67,13 @@ fn height_among_clouds(p: vec3f, altitude: f32) -> f32 {
     return (altitude - frame.sky.shell_base) / (frame.sky.shell_top - frame.sky.shell_base);
 }
 
-// Share of the sun that the clouds in its way scatter on to the ground: that of stratus (Haurwitz 1948: stratus 0.25,
-// stratocumulus 0.35, nimbostratus 0.18 of a clear sky). Without it ground and air under overcast are lit by blue sky alone.
+// Fraction of the sun's irradiance that clouds transmit diffusely to the ground: that of stratus (Haurwitz 1948:
+// stratus 0.25, stratocumulus 0.35, nimbostratus 0.18 of a clear sky). Without it, blue skylight alone lights ground
+// and air under an overcast.
 const PASSED_ON = 0.25;
 
-// Optical depth of the high clouds over a point on the ground, for the sun's cosine with its zenith: the way leaves their
-// sphere once.
+// Optical depth of the high clouds toward the sun, over a point of the ground where the sun has zenith cosine `mu_sun`.
+// The sun ray leaves their sphere once.
 fn high_depth_over(p: vec3f, mu_sun: f32) -> f32 {
     let radius = params.atmosphere.planet_radius;
     let altitude = params.high_clouds.altitude;
@@ -80,7 +82,7 @@ fn high_depth_over(p: vec3f, mu_sun: f32) -> f32 {
     return high_optical_depth(q) / slant;
 }
 
-// Optical depth of the high clouds on a ray from a point: where it enters their sphere, and where it leaves it.
+// Optical depth of the high clouds along a ray from a point: both crossings of their sphere.
 fn high_depth_from(p: vec3f, direction: vec3f) -> f32 {
     let high = hit_sphere_from(p, direction, params.high_clouds.altitude);
     var depth = 0.0;

@@ -1,4 +1,5 @@
-// How sunlight and skylight become the brightness of a cloud: the published models, each as its source gives it.
+// Light models: radiance that clouds scatter toward the eye from sunlight and skylight, for each published model as its
+// source defines it.
 #import math
 #import phase
 #import droplets
@@ -8,7 +9,7 @@
 #import aerial
 #import camera
 
-// Six directions spread over the unit sphere for the cone of light samples (nubis2015's noise kernel).
+// Six directions in the unit sphere for the cone of light samples (nubis2015's noise kernel).
 const CONE = array<vec3f, 6>(
     vec3f(0.38051305, 0.92453449, -0.02111345),
     vec3f(-0.50625799, -0.03590792, -0.86163418),
@@ -18,17 +19,18 @@ const CONE = array<vec3f, 6>(
     vec3f(-0.16852403, 0.14748697, 0.97460106),
 );
 
-// Optical depth from a point toward the sun. Each sample stands for the stretch around it, which grows with its distance;
-// the far one, at three times the reach of the others (nubis2015), for the stretch from one to five times.
+// Optical depth from a point toward the sun. Each sample represents a segment around it; segments grow with distance.
+// The far sample lies at three times the reach of the others (nubis2015) and represents the range from one to five
+// times the reach.
 fn optical_depth_to_sun(p: vec3f, opacity: f32, width: f32) -> f32 {
     let samples = light_samples(p);
     let n = samples.count;
     var depth = 0.0;
-    // Behind little cloud the near samples see the detail; the others are cheap.
-    // So are those that stand for most of a tile of the detail, over which it is its mean.
+    // Cheap samples leave out the detail. Behind much cloud all samples are cheap. So are samples whose segment covers
+    // most of a tile of the detail, over which the detail averages out.
     let fine = detailed_samples(samples);
     let full = select(0u, fine, opacity < params.quality.cheap_light);
-    // Loops are tested at their end: one that is tested at its start runs once more on lavapipe.
+    // The test at the end of the loop: lavapipe runs a loop that is tested at its start once more for nothing.
     var i = 0u;
     if LIGHT_DETAIL && full > 0u {
         loop {
@@ -54,17 +56,18 @@ fn optical_depth_to_sun(p: vec3f, opacity: f32, width: f32) -> f32 {
     return depth;
 }
 
-// Where the samples lie: by squares over a given reach (the stretch of the k-th of n begins at (k / n)^2 of it), or to the
-// end of the clouds, where log(1 + distance / NEAR) grows in equal steps.
+// Placement of the light samples. With a given reach, segment k of n starts at (k / n)^2 of it. Without one, samples
+// reach to the end of the clouds, in equal steps of log(1 + distance / NEAR).
 struct LightSamples {
     reach: f32,
-    rate: f32, // of the logarithm for each sample; 0 for squares
-    near: u32, // how many of them lie so; the others, evenly in the deck above
-    above: vec2f, // where that begins and ends, m
-    count: u32, // of both, without the far one
+    rate: f32, // logarithm per sample; 0 for quadratic placement
+    near: u32, // number of samples so placed; the others lie evenly in the upper deck
+    above: vec2f, // start and end of the upper deck, m
+    count: u32, // number of all samples but the far one
 }
 
-// m: light is lost in the first tens of metres or not for kilometres.
+// Scale of the logarithmic placement, m: sunlight is extinguished within the first tens of metres or crosses
+// kilometres.
 const NEAR = 150.0;
 
 fn light_samples(p: vec3f) -> LightSamples {
@@ -77,8 +80,10 @@ fn light_samples(p: vec3f) -> LightSamples {
     var count = n;
     var above = vec2f(0.0);
     if UPPER && altitude_at(p) < frame.sky.lower_top {
-        // A third more samples: of those as long as they are far, one or none would meet that deck. With them, `draft` errs by
-        // 26 % in `two_decks`, not 14. Were they of the others, those would lie elsewhere as soon as there is such a deck.
+        // A third more samples for the upper deck: of the logarithmic ones, whose segments there are as long as they
+        // are far, one or none falls into it. The error of `draft` in `two_decks` is 26 % without the additional
+        // samples and 14 % with them. Additional samples, unlike a share of the given number, leave the placement of
+        // the others independent of the presence of an upper deck.
         count = n + (n + 2u) / 3u;
         let begin = hit_sphere_from(p, frame.sky.sun_direction, max(params.upper_clouds.base, frame.sky.lower_top)).far;
         above = vec2f(min(begin, reach), reach);
@@ -87,7 +92,7 @@ fn light_samples(p: vec3f) -> LightSamples {
     return LightSamples(reach, log2(1.0 + reach / NEAR) / f32(n), n, above, count);
 }
 
-// How many samples, from the first on, stand for less than most of a tile of the detail.
+// Number of samples, from the first on, whose segment is shorter than most of a tile of the detail.
 fn detailed_samples(samples: LightSamples) -> u32 {
     let most = 0.875 * params.clouds.detail_scale;
     if samples.rate <= 0.0 {
@@ -95,12 +100,12 @@ fn detailed_samples(samples: LightSamples) -> u32 {
     }
     let first = NEAR * (exp2(samples.rate) - 1.0);
     let near = u32(clamp(ceil(log2(max(most / first, 1.0)) / samples.rate), 0.0, f32(samples.near)));
-    // Those above come last: they see the detail where all others do.
+    // The samples of the upper deck are last: they read the detail if all others do.
     let above = (samples.above.y - samples.above.x) / f32(max(samples.count - samples.near, 1u));
     return select(near, samples.count, UPPER && near == samples.near && above < most);
 }
 
-// Where the stretch of a sample begins, m.
+// Start of segment `i`, m.
 fn light_stretch(samples: LightSamples, i: f32) -> f32 {
     if UPPER && i > f32(samples.near) {
         return mix(samples.above.x, samples.above.y, (i - f32(samples.near)) / f32(samples.count - samples.near));
@@ -115,7 +120,7 @@ fn light_stretch(samples: LightSamples, i: f32) -> f32 {
 struct LightSample {
     p: vec3f,
     altitude: f32,
-    length: f32, // of the stretch it stands for
+    length: f32, // of its segment, m
     width: f32,
 }
 
@@ -130,7 +135,7 @@ fn light_sample(samples: LightSamples, p: vec3f, i: u32, width: f32) -> LightSam
     return LightSample(at, altitude_at(at), length, max(width, 0.5 * length));
 }
 
-// The phase function of the light model: Henyey-Greenstein, or two lobes of it, or that of droplets.
+// Phase function of the light model: Henyey-Greenstein, two lobes of it, or that of droplets.
 fn model_phase(one_minus_mu: f32) -> f32 {
     if PHASE != PHASE_HENYEY_GREENSTEIN {
         return droplet_phase(one_minus_mu);
@@ -150,13 +155,13 @@ fn model_phase(one_minus_mu: f32) -> f32 {
     }
 }
 
-// How far sunlight turns toward the eye, and the phase function of that, the mean over a pixel.
+// Scattering angle of sunlight toward the eye, as 1 minus its cosine, and the phase function, averaged over a pixel.
 struct Turn {
     one_minus_mu: f32,
     phase: f32,
 }
 
-// Of the light that a pixel sees, given by its corner.
+// Scattering angle at a pixel, given by its corner.
 fn seen_turn(direction: vec3f, corner: vec2f) -> Turn {
     let one_minus_mu = one_minus_cos(direction, frame.sky.sun_direction);
     if !WIDE_PHASE {
@@ -174,22 +179,22 @@ fn seen_turn(direction: vec3f, corner: vec2f) -> Turn {
     return Turn(one_minus_mu, sum / whole);
 }
 
-// What a cloud sends toward the eye of sunlight that has crossed the optical depth `depth`: radiance for each unit of
-// irradiance and of the eye's own optical depth.
+// Radiance that a cloud scatters toward the eye per unit of irradiance and of optical depth along the view ray, for
+// sunlight that has crossed the optical depth `depth`.
 fn sun_scattering(depth: f32, precipitation: f32, one_minus_mu: f32) -> f32 {
     return seen_scattering(depth, precipitation, Turn(one_minus_mu, model_phase(one_minus_mu)));
 }
 
-// The same of what a pixel sees.
+// Radiance per unit of irradiance and optical depth, with the phase function of a pixel.
 fn seen_scattering(depth: f32, precipitation: f32, turned: Turn) -> f32 {
     if MODEL == MODEL_SINGLE {
         return params.light.albedo * turned.phase * exp(-depth);
     }
-    // Paths are not traced through the high clouds, which have no thickness.
+    // The high clouds have no thickness and use octaves with the path tracer, too.
     if MODEL == MODEL_OCTAVES || MODEL == MODEL_PATH {
         return params.light.albedo * octaves(depth, turned);
     }
-    // Artistic models see a thinner cloud, and a thicker one where it rains (nubis2015's p).
+    // The artistic models scale the optical depth down, and up again in rain (nubis2015's p).
     let d = depth * params.light.absorption * mix(1.0, params.light.rain_absorption, precipitation);
     let powder = 1.0 - params.light.powder * exp(-2.0 * d);
     var beer = exp(-d);
@@ -199,8 +204,8 @@ fn seen_scattering(depth: f32, precipitation: f32, turned: Turn) -> f32 {
     return 2.0 * params.light.sun_gain * beer * powder * turned.phase;
 }
 
-// Further orders as copies of the first with less light, less extinction and less anisotropy each (Wrenninge et al. 2013,
-// Hillaire 2016).
+// Multiple scattering as octaves of single scattering, each with less light, less extinction and less anisotropy
+// (Wrenninge et al. 2013, Hillaire 2016).
 fn octaves(depth: f32, turned: Turn) -> f32 {
     var sum = 0.0;
     var share = 1.0;
@@ -223,7 +228,7 @@ fn octaves(depth: f32, turned: Turn) -> f32 {
     return sum;
 }
 
-// The optical depth toward the sun from which on `sun_scattering` is less than a millionth of what it is at none.
+// Optical depth toward the sun beyond which `sun_scattering` is less than a millionth of its value at 0.
 fn dark_depth() -> f32 {
     const MILLIONTH = 14.0;
     var slowest = 1.0;
@@ -235,7 +240,7 @@ fn dark_depth() -> f32 {
     return MILLIONTH / max(slowest, 1e-6);
 }
 
-// Ambient radiance at a point: of the sky above, with what the user adds, and of what is below.
+// Ambient radiance at a point: from the sky above and from below, each with the user's own ambient light.
 fn ambient_above(sky: vec3f) -> vec3f {
     return params.light.ambient + params.light.ambient_gain * params.light.ambient_top * sky;
 }
@@ -252,12 +257,12 @@ fn is_sunlit() -> bool {
     return any(sky_light[2].rgb > vec3f(0.0));
 }
 
-// What a ray has gathered on its way through the clouds. Scalars alone are summed, for each of the four distances of
-// `AerialPoints` by its share in the sample's; colours come once, at the end. Without air all have the first.
+// Scattering accumulated along a ray. The sums are scalars, distributed over the four distances of `AerialPoints` by
+// interpolation weights; colours are computed once, at the end. Without air all weight is at the first distance.
 struct Gathered {
-    sun: vec4f, // of sun_scattering
-    above: vec4f, // share of the ambient light from above
-    weight: vec4f, // of all samples: together 1 less the transmittance
+    sun: vec4f, // weighted sum of `sun_scattering`
+    above: vec4f, // weighted sum of the ambient light's share from above
+    weight: vec4f, // sum of the samples' weights: in total 1 minus the transmittance
 }
 
 fn gather(sum: Gathered, nodes: AerialPoints, weight: f32, sun: f32, above: f32, distance: f32) -> Gathered {
@@ -272,7 +277,7 @@ fn gather(sum: Gathered, nodes: AerialPoints, weight: f32, sun: f32, above: f32,
     );
 }
 
-// The weight of all samples.
+// Weight of all samples: 1 minus the transmittance.
 fn gathered_weight(sum: Gathered) -> f32 {
     if AIR {
         return sum.weight.x + sum.weight.y + sum.weight.z + sum.weight.w;
@@ -280,7 +285,7 @@ fn gathered_weight(sum: Gathered) -> f32 {
     return sum.weight.x;
 }
 
-// The radiance of what was gathered along a ray from the eye, seen through the air.
+// Radiance of the scattering accumulated along a ray from the eye, seen through the air.
 fn gathered_radiance(sum: Gathered, nodes: AerialPoints, direction: vec3f) -> vec3f {
     if AIR {
         return radiance_through_air(sum, nodes, direction);

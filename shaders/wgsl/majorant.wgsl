@@ -1,20 +1,20 @@
-// What the density near a point never exceeds: what delta tracking steps by (Woodcock et al. 1965).
+// Majorants of the density, by which delta tracking samples its steps (Woodcock et al. 1965).
 #import bindings
 #import density
 
 struct Majorant {
-    density: f32, // never exceeded within `reach` of the point
+    density: f32, // upper bound within `reach` of the point
     reach: f32, // m
 }
 
-// The place in the weather map that is read at `uv`, as its sampler has it.
+// Addressing of the weather map's sampler: position in [0, 1] for any `uv`.
 fn within_map(uv: vec2f) -> vec2f {
     let twice = uv - 2.0 * floor(0.5 * uv);
     let inside = select(uv - floor(uv), min(twice, 2.0 - twice), params.weather.edge == EDGE_MIRROR);
     return select(inside, saturate(uv), params.weather.edge == EDGE_CLAMP);
 }
 
-// Of a point between base and top, or in the box.
+// Majorant at a point between base and top of the clouds, or in the box of the user's grid.
 fn majorant_at(p: vec3f, altitude: f32) -> Majorant {
     let size = vec3f(textureDimensions(majorants));
     var cell: vec3f;
@@ -28,10 +28,11 @@ fn majorant_at(p: vec3f, altitude: f32) -> Majorant {
         let at = sheared(on_chart(p, altitude), altitude);
         let uv = weather_uv(frame.sky.weather_origin, at, large_scale_weather(at));
         cell = vec3f(within_map(uv), height) * size;
-        // Going up a metre also goes sideways in the map, by the wind's lean, and across by more where the map is bent.
+        // A vertical metre is also a horizontal one in the map: wind shear displaces it, and the large-scale map
+        // stretches that.
         let lean = abs(params.wind.shear) / (params.clouds.top - params.clouds.base);
         let bend = select(0.0, frame.sky.broad_stretch, LARGE_SCALE_WEATHER);
-        // A step changes the chart's scale by less than a hundredth.
+        // Within a step the chart's scale changes by less than a hundredth.
         let scale = 1.01 * max(chart_scale(p, altitude), 1.0);
         let across = params.weather.extent / max(size.x, size.y) / (1.0 + lean) / (1.0 + bend) / scale;
         reach = min(across, thickness / size.z);

@@ -1,21 +1,21 @@
-// What one filtered read of a texture takes: loops of nothing but reads along a ray, for `python -m benchmarks.profile`.
+// Cost of one filtered texture read: loops of reads along a ray and nothing else, for `python -m benchmarks.profile`.
 #import bindings
 
-// Texels between two reads of a ray, about as far as one step of a march goes through the base shape.
+// Texels between two reads of a ray: about one step of the march through the base shape.
 const STRIDE = 0.7;
 
-// Where the `i`-th read of the ray through `start` is, in texels of a texture `side` wide. It goes ahead along all axes, at
-// speeds that never meet the same texels again.
+// Position of read `i` on the ray through `start`, in a texture `side` texels wide. Unequal speeds along the axes keep
+// a ray from meeting the same texels again.
 fn read_at(start: vec3f, i: u32, side: f32) -> vec3f {
     return (start + STRIDE * f32(i) * vec3f(0.77, 0.55, 0.32)) / side;
 }
 
-// A level of detail that the compiler does not know, as those of a march; the sampler takes the nearest mip, the finest.
+// Level of detail that is not constant to the compiler, as in the march. The sampler rounds it to the finest mip.
 fn read_lod(i: u32) -> f32 {
     return 0.01 * f32(i % 8u);
 }
 
-// The loop of the others without the read: what is to be subtracted.
+// Loop without a read: the overhead to subtract.
 fn no_reads(start: vec3f, count: u32) -> f32 {
     var sum = vec4f(0.0);
     for (var i = 0u; i < count; i++) {

@@ -1,11 +1,11 @@
-// Several rays through a pixel that is wider than what is in the clouds, as pixels are that look at a planet from space: what
-// is smaller than a pixel shows with its mean, as much of it as there is, and not as speckle.
+// Subrays: several rays through a pixel that is wider than clouds, such as the pixels of a planet seen from space.
+// Clouds smaller than a pixel contribute their mean, in proportion to their cover, instead of speckle.
 #import bindings
 #import camera
 #import shell
 #import sample_grid
 
-// How many rays are marched through a pixel: as many as clouds fit into it where its ray meets them.
+// Number of rays through a pixel: the number of clouds that fit into it at the distance where its ray meets the clouds.
 fn rays_through(view: vec3f) -> f32 {
     if !SUBRAYS {
         return 1.0;
@@ -14,7 +14,8 @@ fn rays_through(view: vec3f) -> f32 {
     return clamp(ceil(width * width), 1.0, frame.view.most_rays);
 }
 
-// Where in its pixel, or in what stands for it where not all are known, a ray lies; one alone in the middle.
+// Position of a ray, pixels. Several rays are spread over the pixel, at low resolution over the spacing of samples. A
+// single ray passes through the centre.
 fn ray_place(pixel: vec2u, at: vec2f, rays: f32) -> vec2f {
     return vec2f(pixel) + 0.5 + select(vec2f(0.0), (at - 0.5) * f32(spacing()), rays > 1.0);
 }

@@ -1,17 +1,16 @@
-// The user's grid: extinction at the centres of voxels, trilinear between them, in a straight box.
+// User's grid: extinction at voxel centres, trilinearly interpolated, in an axis-aligned box.
 #import bindings
 
 fn in_volume(p: vec3f) -> bool {
     return all(p >= frame.sky.volume_low) && all(p <= frame.sky.volume_high);
 }
 
-// Where a point lies, in voxels: a whole number at the centre of each, so that the value is a cubic along a ray between
-// two whole numbers.
+// Position in voxels. Voxel centres are integers, and along a ray the value is a cubic between two integer planes.
 fn volume_cell(p: vec3f) -> vec3f {
     return (p - frame.sky.volume_low) * frame.sky.volume_scale - 0.5;
 }
 
-// The density in the box, 1 at the largest extinction. Outside it the value of its nearest face.
+// Density in the box, 1 at the largest extinction. Outside the box it is that of the nearest face.
 fn volume_density(p: vec3f) -> f32 {
     if PRECISE {
         return volume_density_exact(volume_cell(p));
@@ -20,7 +19,7 @@ fn volume_density(p: vec3f) -> f32 {
     return textureSampleLevel(volume, clamp_sampler, uvw, 0.0).r;
 }
 
-// Hardware filters with weights of as little as 8 bits (docs/numerics.md): here are all 24.
+// Trilinear interpolation with weights of 24 bits; hardware filters have as few as 8 (docs/numerics.md).
 fn volume_density_exact(cell: vec3f) -> f32 {
     let last = vec3f(textureDimensions(volume_exact)) - 1.0;
     let at = clamp(cell, vec3f(0.0), last);
@@ -39,8 +38,9 @@ fn volume_texel(x: i32, y: i32, z: i32) -> f32 {
     return textureLoad(volume_exact, vec3i(x, y, z), 0).r;
 }
 
-// Distance along a ray to the first plane through voxel centres past `t`: between two of them the density is a cubic,
-// for which two Gauss points are exact. Planes come from whole numbers, so that no error adds up (hazard 17).
+// Distance along a ray to the first plane through voxel centres beyond `t`. Between two of those planes the density is
+// a cubic, for which two Gauss points are exact. Planes come from integers, so that errors do not accumulate
+// (docs/numerics.md).
 fn next_plane(origin: vec3f, direction: vec3f, t: f32) -> f32 {
     let start = volume_cell(origin);
     let speed = direction * frame.sky.volume_scale;
@@ -50,7 +50,7 @@ fn next_plane(origin: vec3f, direction: vec3f, t: f32) -> f32 {
         if abs(v) > 1e-20 {
             let at = start[axis] + t * v;
             let ahead = sign(v);
-            // The next whole number in the direction of the ray, or, where rounding has left it behind, the one after.
+            // Next integer along the ray; if rounding has put it behind `t`, the one after.
             let plane = select(ceil(at) - 1.0, floor(at) + 1.0, v > 0.0);
             let hit = (plane - start[axis]) / v;
             next = min(next, select((plane + ahead - start[axis]) / v, hit, hit > t * (1.0 + 2e-7)));

@@ -1,6 +1,6 @@
-//! How long a small frame takes, and each kernel in it: `frame/*` by the clock, `pass/*` by the GPU's timestamps.
+//! Time of a small frame and of each of its kernels: `frame/*` is wall-clock time, `pass/*` comes from GPU timestamps.
 //!
-//! `NUBIS_ADAPTER` chooses the adapter, as in Python.
+//! `NUBIS_ADAPTER` selects the adapter, as in Python.
 
 use std::time::Duration;
 
@@ -11,7 +11,7 @@ use glam::DVec3;
 const WIDTH: u32 = 320;
 const HEIGHT: u32 = 180;
 
-/// What a bench renders. It changes from iteration to iteration, so that what is baked once is baked again.
+/// Renderer and inputs of a benchmark. The inputs change with each iteration, so that LUTs are rebaked.
 struct Scene {
     renderer: Renderer,
     camera: Camera,
@@ -33,25 +33,25 @@ impl Scene {
         self.renderer.render(&Shot::new(&self.camera, &self.params, self.time), false, &|| Ok(())).expect("renders");
     }
 
-    /// The next frame of an animation in which clouds and camera move.
+    /// Next frame of an animation with moving clouds and camera.
     fn animate(&mut self) {
         self.time += 1.0 / 24.0;
         self.camera.eye.y += 1.0;
         self.renderer.animate(&Shot::new(&self.camera, &self.params, self.time), &|| Ok(())).expect("renders");
     }
 
-    /// Asks for the density at one point, which bakes what is stale and marches nothing.
+    /// Queries the density at one point, which rebakes stale LUTs without a march.
     fn bake(&mut self) {
         self.renderer.density(&[[0.0; 3]], &self.params, self.time, &|| Ok(())).expect("answers");
     }
 
-    /// Milliseconds of a kernel in the last frame; none on adapters without timestamps.
+    /// Time of a kernel in the last frame in ms; None on adapters without timestamps.
     fn timing(&self, kernel: &str) -> Option<f64> {
         self.renderer.timings.0.iter().find(|(name, _)| name == kernel).map(|(_, milliseconds)| *milliseconds)
     }
 }
 
-/// Measures each of the kernels that one call of `run` dispatches.
+/// Measures each kernel that one call of `run` dispatches.
 fn passes(group: &mut BenchmarkGroup<'_, WallTime>, scene: &mut Scene, kernels: &[&str], run: impl Fn(&mut Scene)) {
     for kernel in kernels {
         group.bench_function(*kernel, |bencher| {
@@ -76,7 +76,7 @@ fn main() {
     let mut scene = Scene::new(adapter.as_deref()).expect("there is an adapter");
     let info = &scene.renderer.gpu().info;
     println!("{} ({}), {WIDTH} x {HEIGHT}", info.name, info.driver);
-    // Compiles the kernels and bakes the textures.
+    // Warm-up: compiles the kernels and bakes the LUTs.
     scene.still();
 
     let mut frames = criterion.benchmark_group("frame");

@@ -7,7 +7,7 @@ fn main() -> io::Result<()> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     for (path, content) in clouds_core::generate::files() {
         let path = root.join(path);
-        // Left alone when current, so that nothing that watches its time is built again.
+        // An unchanged file keeps its modification time, so that nothing is rebuilt.
         if fs::read_to_string(&path).is_ok_and(|old| old == content) {
             continue;
         }

@@ -115,7 +115,7 @@ fn phase_width(params: &Params) -> f32 {
     }
 }
 
-/// The fractional part of `v / period`, in f64: f32 coordinates would be metres off after a week of wind (hazard 13).
+/// The fractional part of `v / period`, in f64: f32 coordinates would be metres off after a week of wind.
 fn wrap(v: f64, period: f32) -> f32 {
     let fraction = (v / f64::from(period)).rem_euclid(1.0) as f32;
     // Rounding to f32 may give 1.0, which is 0; and a way too long for f64 has no fraction.

@@ -1,13 +1,13 @@
-//! The modules of the crate import one another without a cycle, and the device layer knows nothing above it.
+//! Module dependencies: imports have no cycle, and the device layer imports nothing above it.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 
-/// Modules, and what each imports.
+/// Imports of each module.
 type Graph = BTreeMap<String, BTreeSet<String>>;
 
-/// The text of each module, without its tests: `luts::sky` of `luts/sky.rs`, `luts` of `luts/mod.rs`.
+/// Source of each module without its tests: `luts::sky` from `luts/sky.rs`, `luts` from `luts/mod.rs`.
 fn modules(folder: &Path, parent: &str, found: &mut BTreeMap<String, String>) {
     for entry in fs::read_dir(folder).expect("is a folder").map(|entry| entry.expect("can be read").path()) {
         let stem = entry.file_stem().expect("has a name").to_string_lossy().into_owned();
@@ -22,7 +22,7 @@ fn modules(folder: &Path, parent: &str, found: &mut BTreeMap<String, String>) {
     }
 }
 
-/// The paths of a `use` without its braces: `a::{b, c::d}` is `a::b` and `a::c::d`.
+/// Expands the braces of a `use` path: `a::{b, c::d}` is `a::b` and `a::c::d`.
 fn flattened(path: &str) -> Vec<String> {
     let Some((head, rest)) = path.split_once('{') else { return vec![path.to_owned()] };
     let inner = rest.rsplit_once('}').map_or(rest, |(inner, _)| inner);
@@ -39,7 +39,7 @@ fn flattened(path: &str) -> Vec<String> {
     parts.iter().filter(|part| !part.is_empty()).flat_map(|part| flattened(&format!("{head}{part}"))).collect()
 }
 
-/// The modules that a module's `use` lines and paths through `crate` name.
+/// Modules named by the `use` lines of a module and by its paths through `crate`.
 fn imports(name: &str, code: &str, all: &BTreeMap<String, String>) -> BTreeSet<String> {
     let code: String = code.lines().map(|line| line.split("//").next().unwrap_or_default().to_owned() + "\n").collect();
     let mut paths = Vec::new();
@@ -57,7 +57,7 @@ fn imports(name: &str, code: &str, all: &BTreeMap<String, String>) -> BTreeSet<S
         Some(("crate", rest)) => Some(rest.to_owned()),
         Some(("super", rest)) if parent.is_empty() => Some(rest.to_owned()),
         Some(("super", rest)) => Some(format!("{parent}::{rest}")),
-        // Of a module's own children.
+        // Child modules.
         Some((first, _)) => Some(format!("{name}::{first}")),
         None => None,
     });
@@ -79,8 +79,9 @@ fn graph() -> Graph {
     all.iter().map(|(name, code)| (name.clone(), imports(name, code, &all))).collect()
 }
 
-/// Modules that import one another in a circle, if any: what is left when those are taken away that import nothing that is left.
-fn circle(mut graph: Graph) -> Graph {
+/// Modules in import cycles, and modules that import them: the rest after repeated removal of modules without remaining
+/// imports.
+fn cycle(mut graph: Graph) -> Graph {
     loop {
         let left: BTreeSet<_> = graph.keys().cloned().collect();
         let before = graph.len();
@@ -95,8 +96,8 @@ fn circle(mut graph: Graph) -> Graph {
 fn the_modules_import_one_another_without_a_cycle() {
     let graph = graph();
     assert!(graph["renderer"].contains("luts") && graph["luts::sky"].contains("luts::lut"), "{graph:#?}");
-    let circle = circle(graph);
-    assert!(circle.is_empty(), "a cycle is among these: {circle:#?}");
+    let cycle = cycle(graph);
+    assert!(cycle.is_empty(), "a cycle is among these: {cycle:#?}");
 }
 
 #[test]
@@ -119,6 +120,6 @@ fn a_cycle_is_found() {
         ("c".to_owned(), of(&["b"])),
         ("d".to_owned(), of(&[])),
     ]);
-    assert_eq!(circle(graph).into_keys().collect::<Vec<_>>(), ["a", "b", "c"]);
+    assert_eq!(cycle(graph).into_keys().collect::<Vec<_>>(), ["a", "b", "c"]);
     assert_eq!(flattened("crate::a::{b,c::{d,e}}"), ["crate::a::b", "crate::a::c::d", "crate::a::c::e"]);
 }

@@ -1,4 +1,4 @@
-//! Every shader links and is valid, and agrees with the parameters; no GPU needed.
+//! Validity of every shader, and agreement with the Rust declarations; without a GPU.
 
 use std::collections::BTreeSet;
 
@@ -33,13 +33,13 @@ fn is_word(c: char) -> bool {
     c.is_alphanumeric() || c == '_'
 }
 
-/// The words of WGSL without its comments.
+/// Words of WGSL source without comments.
 fn words(source: &str) -> impl Iterator<Item = &str> {
     let code = source.lines().filter_map(|line| line.split("//").next());
     code.flat_map(|code| code.split(|c| !is_word(c))).filter(|word| !word.is_empty())
 }
 
-/// The constants that WGSL declares, in functions too.
+/// Constants that WGSL declares, also inside functions.
 fn declared(source: &str) -> BTreeSet<&str> {
     words(source).zip(words(source).skip(1)).filter(|(before, _)| *before == "const").map(|(_, name)| name).collect()
 }
@@ -56,7 +56,7 @@ fn no_shader_declares_a_constant_of_rust_again() {
     }
 }
 
-/// One that only Rust uses need not be shared.
+/// A constant that Rust alone reads must not be shared.
 #[test]
 fn shaders_read_each_constant_of_rust() {
     let generated = shader::read("constants").expect("is generated");
@@ -73,7 +73,7 @@ fn errors_name_the_file_and_line() {
     assert!(error.contains("(source).wgsl:3"), "{error}");
 }
 
-/// naga's own layout of a struct of the linked shaders: name, offset and size of its members, and its span.
+/// naga's layout of a struct: name, offset and size of its members, and its span, in bytes.
 fn naga_struct(module: &naga::Module, name: &str) -> (Vec<(String, u32, u32)>, u32) {
     let mut layouter = naga::proc::Layouter::default();
     layouter.update(module.to_ctx()).expect("has a layout");

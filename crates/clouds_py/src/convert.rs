@@ -1,4 +1,4 @@
-//! Python values to parameter values, and back.
+//! Conversion between Python values and parameter values.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use pyo3::types::{PyBool, PyBytes, PyDict, PyFloat, PyInt, PyList, PyString, PyT
 
 use crate::{DensityGrid, exception};
 
-/// A value as the parameters know it. What fits no parameter at all comes back as text, which no check lets pass.
+/// Converts a Python value to a parameter value. A value of no parameter type becomes text, which every check rejects.
 pub fn value_from_python(value: &Bound<'_, PyAny>) -> PyResult<Value> {
     if value.is_none() {
         return Ok(Value::None);
@@ -23,7 +23,7 @@ pub fn value_from_python(value: &Bound<'_, PyAny>) -> PyResult<Value> {
     if is_array(value) {
         return Ok(array_from_python(value).unwrap_or_else(Value::Text));
     }
-    // Text would be a sequence of letters, and bytes one of numbers.
+    // A string is a sequence of letters and bytes are a sequence of numbers; neither is a vector.
     let parts: Vec<Bound<'_, PyAny>> =
         if value.is_instance_of::<PyBytes>() { Vec::new() } else { value.extract().unwrap_or_default() };
     let number = |part: &Bound<'_, PyAny>| match plain_from_python(part) {
@@ -33,18 +33,18 @@ pub fn value_from_python(value: &Bound<'_, PyAny>) -> PyResult<Value> {
     };
     match parts.iter().map(number).collect() {
         Some(numbers) if !parts.is_empty() => Ok(Value::Vector(numbers)),
-        _ => Ok(Value::Text(shown(value))),
+        _ => Ok(Value::Text(repr_of(value))),
     }
 }
 
-/// Whether a value has axes, or is nested as one that does.
+/// Whether a value has axes, or is a nested sequence.
 fn is_array(value: &Bound<'_, PyAny>) -> bool {
     let nested = || value.get_item(0).is_ok_and(|row| row.cast::<PyString>().is_err() && row.len().is_ok());
     let sequence = value.cast::<PyList>().is_ok() || value.cast::<PyTuple>().is_ok();
     if sequence { nested() } else { value.hasattr("ndim").is_ok_and(|has| has) }
 }
 
-/// A switch, a word or a number.
+/// Bool, string or number.
 fn plain_from_python(value: &Bound<'_, PyAny>) -> Option<Value> {
     if let Ok(v) = value.cast::<PyBool>() {
         return Some(Value::Bool(v.is_true()));
@@ -56,19 +56,19 @@ fn plain_from_python(value: &Bound<'_, PyAny>) -> Option<Value> {
         return Some(Value::Text(v.to_string_lossy().into_owned()));
     }
     if let Ok(v) = value.cast::<PyInt>() {
-        // Beyond i64 no parameter reaches; as a float it is refused with its value, if it fits into one.
+        // Integers beyond i64 exceed the range of every parameter. As floats, if they fit, the error shows their value.
         let number = v.extract::<i64>().map(Value::Int).or_else(|_| v.extract::<f64>().map(Value::Float));
-        return Some(number.unwrap_or_else(|_| Value::Text(shown(value))));
+        return Some(number.unwrap_or_else(|_| Value::Text(repr_of(value))));
     }
     if !value.hasattr("dtype").is_ok_and(|has| has) {
         return value.extract::<f64>().ok().map(Value::Float);
     }
-    // NumPy scalars, which are no Python numbers, and arrays without axes.
+    // NumPy scalars, which are not Python numbers, and arrays without axes.
     match opened(value, &[], "fiub") {
         Ok(array) if array.getattr("ndim").is_ok_and(|axes| axes.extract::<usize>().is_ok_and(|axes| axes == 0)) => {
             let item = array.call_method0("item").ok()?;
             if item.hasattr("dtype").is_ok_and(|has| has) {
-                // A float longer than Python's stays one of NumPy's.
+                // A float longer than Python's stays a NumPy scalar.
                 return item.extract::<f64>().ok().map(Value::Float);
             }
             plain_from_python(&item)
@@ -77,7 +77,7 @@ fn plain_from_python(value: &Bound<'_, PyAny>) -> Option<Value> {
     }
 }
 
-fn shown(value: &Bound<'_, PyAny>) -> String {
+fn repr_of(value: &Bound<'_, PyAny>) -> String {
     const LONGEST: usize = 200;
     let text = value.repr().map_or_else(|_| "?".into(), |text| text.to_string_lossy().into_owned());
     match text.char_indices().nth(LONGEST) {
@@ -86,14 +86,15 @@ fn shown(value: &Bound<'_, PyAny>) -> String {
     }
 }
 
-/// A value as the gate for arrays (python/nubis/_arrays.py) reads it, or what it is instead.
+/// Array after the checks of python/nubis/_arrays.py, or a description of the rejected value.
 fn opened<'py>(value: &Bound<'py, PyAny>, dims: &[&str], kinds: &str) -> Result<Bound<'py, PyAny>, String> {
     let py = value.py();
     let gate = py.import("nubis._arrays").and_then(|module| module.getattr("opened"));
     gate.and_then(|gate| gate.call1((value, dims, kinds))).map_err(|error| error.value(py).to_string())
 }
 
-/// The argument called `name` as a contiguous array of float64 or float32 and one of some shapes (None: any length), finite.
+/// Argument `name` as a contiguous, finite array of float64 or float32. Its shape is one of `shapes`, in which None is
+/// any length.
 pub fn numbers_from_python<'py, T: numpy::Element>(
     name: &str,
     value: &Bound<'py, PyAny>,
@@ -111,7 +112,7 @@ pub fn numbers_from_python<'py, T: numpy::Element>(
     gate.call((name, value, allowed), Some(&kwargs))?.extract()
 }
 
-/// A vector, or a map; what it is instead where it is neither.
+/// Vector or map, or a description of another array.
 fn array_from_python(value: &Bound<'_, PyAny>) -> Result<Value, String> {
     let array = opened(value, &["y", "x"], "fiu")?;
     let failed = |error: PyErr| error.value(value.py()).to_string();
@@ -130,7 +131,7 @@ fn array_from_python(value: &Bound<'_, PyAny>) -> Result<Value, String> {
         [_, _, channels] if channels > 0 => channels,
         _ => return Err(format!("array of shape {shape:?}")),
     };
-    // Where warnings are errors, numbers that f32 does not hold are one.
+    // With warnings as errors, the conversion of values beyond f32 fails.
     let Ok(numbers) = read("float32") else {
         return Err(format!("array of shape {shape:?} with numbers beyond float32"));
     };
@@ -139,7 +140,7 @@ fn array_from_python(value: &Bound<'_, PyAny>) -> Result<Value, String> {
     Ok(Value::Map(Arc::new(Map { width: shape[1], height: shape[0], channels, data })))
 }
 
-/// A value for Python; maps become read-only arrays.
+/// Converts a parameter value to Python; maps become read-only arrays.
 pub fn value_to_python<'py>(py: Python<'py>, value: &Value) -> PyResult<Bound<'py, PyAny>> {
     Ok(match value {
         Value::Bool(v) => PyBool::new(py, *v).to_owned().into_any(),
@@ -160,7 +161,7 @@ pub fn value_to_python<'py>(py: Python<'py>, value: &Value) -> PyResult<Bound<'p
     })
 }
 
-fn fill(block: &mut dyn Block, path: &str, object: &Bound<'_, PyAny>) -> PyResult<()> {
+fn read_block(block: &mut dyn Block, path: &str, object: &Bound<'_, PyAny>) -> PyResult<()> {
     for field in block.fields() {
         let value = value_from_python(&object.getattr(field.name)?)?;
         schema::assign(block, path, field.name, &value).map_err(|error| exception(object.py(), &error))?;
@@ -168,16 +169,16 @@ fn fill(block: &mut dyn Block, path: &str, object: &Bound<'_, PyAny>) -> PyResul
     Ok(())
 }
 
-/// The parameters of a `nubis.Params`.
+/// Converts a `nubis.Params`.
 pub fn params_from_python(object: &Bound<'_, PyAny>) -> PyResult<Params> {
     let mut params = Params::default();
     for (name, block) in params.blocks_mut() {
-        fill(block, name, &object.getattr(name)?)?;
+        read_block(block, name, &object.getattr(name)?)?;
     }
     for (index, pair) in object.getattr("weather_mix")?.try_iter()?.enumerate() {
         let (weather, share): (Bound<'_, PyAny>, f64) = pair?.extract()?;
         let mut block = Weather::default();
-        fill(&mut block, &format!("weather_mix[{index}]"), &weather)?;
+        read_block(&mut block, &format!("weather_mix[{index}]"), &weather)?;
         params.weather_mix.push((block, share as f32));
     }
     let volume = object.getattr("volume")?;
@@ -187,14 +188,14 @@ pub fn params_from_python(object: &Bound<'_, PyAny>) -> PyResult<Params> {
     Ok(params)
 }
 
-/// The numerical method of a `nubis.Quality`.
+/// Converts a `nubis.Quality`.
 pub fn quality_from_python(object: &Bound<'_, PyAny>) -> PyResult<Quality> {
     let mut quality = Quality::default();
-    fill(&mut quality, "quality", object)?;
+    read_block(&mut quality, "quality", object)?;
     Ok(quality)
 }
 
-/// A number for an argument called `name`.
+/// Converts the argument `name` to a number.
 pub fn number_from_python(name: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
     match value_from_python(value)? {
         Value::Int(v) => Ok(v as f64),
@@ -203,7 +204,7 @@ pub fn number_from_python(name: &str, value: &Bound<'_, PyAny>) -> PyResult<f64>
     }
 }
 
-/// Three numbers for an argument called `name`.
+/// Converts the argument `name` to three numbers.
 pub fn vector_from_python(name: &str, value: &Bound<'_, PyAny>) -> PyResult<DVec3> {
     match value_from_python(value)? {
         Value::Vector(v) if v.len() == 3 => Ok(DVec3::new(v[0], v[1], v[2])),

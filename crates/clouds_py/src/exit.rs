@@ -1,9 +1,9 @@
-//! The end of the interpreter while other threads render.
+//! Exit of the interpreter while other threads render.
 //!
-//! CPython up to 3.13 ends a thread that wants the GIL then by `pthread_exit`, which unwinds its stack: through frames of
-//! Rust that is an abort. And a driver whose threads work while the process tears it down crashes or hangs. So `close`,
-//! called by `atexit` before all of that, waits until no other thread is in here, and none comes out or in again: they
-//! sleep without the GIL until the process is gone.
+//! CPython up to 3.13 ends a thread that requests the GIL during finalization by `pthread_exit`, which unwinds its
+//! stack: through Rust frames that is an abort. A driver whose threads run while the process destroys it crashes or
+//! hangs. `atexit` therefore calls `close` first. It waits until no other thread is in a call; threads that enter or
+//! leave a call later sleep without the GIL until the process ends.
 
 use std::cell::Cell;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -12,22 +12,22 @@ use std::time::{Duration, Instant};
 use pyo3::prelude::*;
 
 static CLOSING: AtomicBool = AtomicBool::new(false);
-/// Threads that are in a call.
+/// Number of threads in a call.
 static INSIDE: AtomicUsize = AtomicUsize::new(0);
-/// Longest wait for them. Submissions end within a second, compiling kernels within ten.
+/// Maximum wait for them. Submissions end within a second, compilation of kernels within ten.
 const PATIENCE: Duration = Duration::from_secs(30);
 
 thread_local! {
-    /// Calls of this thread, one in another.
+    /// Depth of nested calls of this thread.
     static DEPTH: Cell<usize> = const { Cell::new(0) };
-    /// Whether this thread ends the interpreter: it may still render, in what `atexit` calls later.
+    /// Whether this thread ends the interpreter. It may still render, in later `atexit` handlers.
     static CLOSER: Cell<bool> = const { Cell::new(false) };
 }
 
-/// That a thread is in a call, as long as it lives.
+/// Guard of a thread in a call.
 pub struct Inside(());
 
-/// Begins a call; at the end of the interpreter it never returns.
+/// Begins a call; never returns during finalization.
 pub fn enter(py: Python<'_>) -> Inside {
     if DEPTH.replace(DEPTH.get() + 1) == 0 {
         INSIDE.fetch_add(1, Ordering::SeqCst);
@@ -44,12 +44,12 @@ impl Drop for Inside {
     }
 }
 
-/// Whether the work of this thread is no longer wanted.
+/// Whether the work of this thread is to be stopped.
 pub fn is_closing() -> bool {
     CLOSING.load(Ordering::SeqCst) && !CLOSER.get()
 }
 
-/// Keeps a thread that is in a call and holds nothing, if the interpreter ends.
+/// Parks a thread that is in a call and holds no locks, if the interpreter exits.
 pub fn stay_if_closing(py: Python<'_>) {
     if is_closing() {
         INSIDE.fetch_sub(1, Ordering::SeqCst);
@@ -61,7 +61,7 @@ pub fn stay_if_closing(py: Python<'_>) {
     }
 }
 
-/// Stops all renders and waits for them; for `atexit`.
+/// Stops all renders and waits for them; registered with `atexit`.
 #[pyfunction]
 pub fn close(py: Python<'_>) {
     CLOSER.set(true);
@@ -74,7 +74,7 @@ pub fn close(py: Python<'_>) {
     });
 }
 
-/// Forgets the threads that a forked child does not have.
+/// Resets the count of threads in a forked child, which has only its own.
 #[pyfunction]
 pub fn forked() {
     INSIDE.store(DEPTH.get().min(1), Ordering::SeqCst);

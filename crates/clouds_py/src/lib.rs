@@ -1,4 +1,4 @@
-//! `nubis._nubis`: the renderer for Python. Thin: it turns Python values into the core's and back.
+//! Module `nubis._nubis`: the renderer for Python, a thin conversion layer over the core.
 
 mod convert;
 mod exit;
@@ -27,7 +27,7 @@ use convert::{
     value_to_python, vector_from_python,
 };
 
-/// The exception of the package that an error of the core becomes.
+/// Python exception of an error of the core.
 fn exception(py: Python<'_>, error: &Error) -> PyErr {
     let name = match error {
         Error::Parameter(_) => "ParameterError",
@@ -54,7 +54,8 @@ fn unlocked<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> T {
     result
 }
 
-/// Runs `work` without the GIL. It is handed a check for Ctrl-C and the end of the interpreter; no panic leaves it.
+/// Runs `work` without the GIL. Its interrupt check reports Ctrl-C and the exit of the interpreter. A panic becomes an
+/// error.
 fn detached<T: Send>(py: Python<'_>, work: impl FnOnce(gpu::Interrupt<'_>) -> Result<T> + Send) -> PyResult<T> {
     let (result, interrupt) = unlocked(py, || {
         let raised = RefCell::new(None);
@@ -62,7 +63,7 @@ fn detached<T: Send>(py: Python<'_>, work: impl FnOnce(gpu::Interrupt<'_>) -> Re
             if exit::is_closing() {
                 return Err(Error::Interrupted);
             }
-            // None at the end of the interpreter.
+            // There is no interpreter to attach to during finalization.
             Python::try_attach(|py| py.check_signals()).unwrap_or(Ok(())).map_err(|error| {
                 *raised.borrow_mut() = Some(error);
                 Error::Interrupted
@@ -90,7 +91,7 @@ fn fov_y_or_default(fov_y: Option<&Bound<'_, PyAny>>) -> PyResult<f64> {
     fov_y.map_or(Ok(60.0), |fov_y| number_from_python("fov_y", fov_y))
 }
 
-/// A camera: see `Camera.look_at`, `from_matrix`, `equirect` and `fisheye`.
+/// A camera. Constructors: `look_at`, `from_matrix`, `equirect` and `fisheye`.
 #[pyclass(frozen, eq, from_py_object, module = "nubis")]
 #[derive(Clone, Copy, PartialEq)]
 struct Camera(CoreCamera);
@@ -99,18 +100,27 @@ type CameraState = (u8, [f64; 3], [f64; 3], [f64; 3], [f64; 3], f64);
 
 #[pymethods]
 impl Camera {
-    /// A pinhole camera.
+    /// Return a pinhole camera that looks at a point.
     ///
     /// Parameters
     /// ----------
     /// eye : (3,) floats
-    ///     Position in world metres (x east, y north, z up).
+    ///     Camera position in world metres (x east, y north, z up).
     /// target : (3,) floats
-    ///     A point in the middle of the picture.
+    ///     World point at the centre of the picture.
     /// up : (3,) floats
-    ///     A direction that is up in the picture; (0, 0, 1) if left out.
+    ///     Up direction of the picture; (0, 0, 1) if left out.
     /// fov_y : float
     ///     Vertical field of view in degrees, above 0 and at most 179; 60 if left out.
+    ///
+    /// Raises
+    /// ------
+    /// ParameterError
+    ///     For a value that is not allowed.
+    ///
+    /// Examples
+    /// --------
+    /// >>> camera = nubis.Camera.look_at(eye=(0, 0, 2), target=(0, 1000, 400), fov_y=60.0)
     #[staticmethod]
     #[pyo3(signature = (eye, target, up=None, fov_y=None))]
     fn look_at(
@@ -125,16 +135,22 @@ impl Camera {
         raise(py, CoreCamera::look_at(eye, target, up, fov_y_or_default(fov_y)?)).map(Self)
     }
 
-    /// A pinhole camera from a matrix.
+    /// Return a pinhole camera from a camera-to-world matrix.
     ///
     /// Parameters
     /// ----------
     /// world_from_camera : (4, 4) floats
-    ///     Takes camera coordinates to world metres; a rigid motion.
+    ///     Rigid transform from camera coordinates to world metres.
     /// fov_y : float
     ///     Vertical field of view in degrees, above 0 and at most 179; 60 if left out.
     /// convention : {"opengl", "opencv"}
-    ///     The camera's axes: +x right, +y up, looking down -z; or +x right, +y down, looking down +z.
+    ///     Axes of the camera. OpenGL: +x right, +y up, view direction -z. OpenCV: +x right, +y
+    ///     down, view direction +z.
+    ///
+    /// Raises
+    /// ------
+    /// ParameterError
+    ///     For a value that is not allowed, or a matrix that is no rigid transform.
     #[staticmethod]
     #[pyo3(
         signature = (world_from_camera, fov_y=None, convention=None),
@@ -159,20 +175,21 @@ impl Camera {
         raise(py, CoreCamera::from_matrix(rows, fov_y_or_default(fov_y)?, convention)).map(Self)
     }
 
-    /// The whole sphere around `eye` by longitude and latitude.
+    /// Return an equirectangular camera: the whole sphere around `eye`, in world metres.
     ///
-    /// The image's centre is north, right is clockwise seen from above (east), its top row the zenith. Twice as wide
-    /// as high gives square pixels.
+    /// The centre of the picture is north, its right half east (clockwise seen from above), its top
+    /// row the zenith. A width of twice the height gives square pixels.
     #[staticmethod]
     fn equirect(eye: &Bound<'_, PyAny>) -> PyResult<Self> {
         raise(eye.py(), CoreCamera::equirect(vector_from_python("eye", eye)?)).map(Self)
     }
 
-    /// An equidistant all-sky camera.
+    /// Return an equidistant fisheye (all-sky) camera at `eye`, in world metres.
     ///
-    /// The image's centre is `up` (the zenith if left out), its top as far north as can be; as on a photograph of the
-    /// sky, east is on the left. `fov` degrees (180 if left out) span the shorter side; outside that circle pixels are 0
-    /// with alpha 0.
+    /// The centre of the picture is the direction `up` (the zenith if left out). Its top is the
+    /// direction closest to north; east is on the left, as on a photograph of the sky. `fov`
+    /// degrees (180 if left out) span the shorter side. Pixels outside that circle are 0 with alpha
+    /// 0.
     #[staticmethod]
     #[pyo3(signature = (eye, up=None, fov=None))]
     fn fisheye(
@@ -186,7 +203,7 @@ impl Camera {
         raise(py, CoreCamera::fisheye(vector_from_python("eye", eye)?, up, fov)).map(Self)
     }
 
-    /// The projection: "perspective", "equirect" or "fisheye".
+    /// Projection: "perspective", "equirect" or "fisheye".
     #[getter]
     fn kind(&self) -> &'static str {
         match self.0.projection {
@@ -196,13 +213,13 @@ impl Camera {
         }
     }
 
-    /// Position in world metres.
+    /// Camera position in world metres.
     #[getter]
     fn eye(&self) -> (f64, f64, f64) {
         self.0.eye.into()
     }
 
-    /// Unit vector toward the middle of the picture.
+    /// Unit vector toward the centre of the picture.
     #[getter]
     fn forward(&self) -> (f64, f64, f64) {
         self.0.forward.into()
@@ -220,13 +237,13 @@ impl Camera {
         self.0.right.into()
     }
 
-    /// Field of view in degrees: vertical, of a fisheye its whole circle.
+    /// Field of view in degrees: vertical, or of the whole circle of a fisheye.
     #[getter]
     fn fov(&self) -> f64 {
         self.0.fov
     }
 
-    /// The 4 x 4 matrix that takes camera coordinates (OpenGL) to world coordinates, by rows.
+    /// Camera-to-world matrix, 4 x 4, by rows; OpenGL camera coordinates.
     fn matrix(&self) -> [[f64; 4]; 4] {
         self.0.matrix()
     }
@@ -249,7 +266,7 @@ impl Camera {
     fn __hash__(&self) -> u64 {
         let c = &self.0;
         let numbers = [c.eye, c.right, c.up, c.forward].map(|v| v.to_array());
-        // -0.0 equals 0.0, so it hashes as it.
+        // -0.0 equals 0.0, so both have the same hash.
         let bits = numbers.iter().flatten().chain([&c.fov]).map(|v| (v + 0.0).to_bits());
         fnv([c.projection as u64].into_iter().chain(bits))
     }
@@ -270,16 +287,21 @@ impl Camera {
     }
 }
 
-/// A cloud of your own: extinction on a grid.
+/// A user-supplied cloud: extinction on a regular grid.
 ///
 /// Parameters
 /// ----------
 /// extinction : array-like of float32, shape (nz, ny, nx)
-///     In 1/m, at the centres of the voxels, trilinear between them; the outermost values hold to the
-///     faces of the box, outside there is nothing.
+///     Extinction in 1/m at the centres of the voxels, with trilinear interpolation. The outermost
+///     values extend to the faces of the box; the extinction outside the box is 0.
 /// bounds : ((x0, y0, z0), (x1, y1, z1))
-///     Lowest and highest corner of the box in world metres. It is straight: the planet's curvature
-///     does not bend it, and the wind does not move it.
+///     Lowest and highest corner of the box in world metres. The box is a cuboid: it does not
+///     follow the curvature of the planet, and the wind does not move it.
+///
+/// Raises
+/// ------
+/// ParameterError
+///     For a value that is not allowed.
 #[pyclass(frozen, eq, module = "nubis")]
 #[derive(PartialEq)]
 struct DensityGrid(Arc<CoreGrid>);
@@ -304,14 +326,14 @@ impl DensityGrid {
         Ok(Self(Arc::new(raise(py, grid)?)))
     }
 
-    /// Extinction in 1/m, float32 of shape (nz, ny, nx): a copy.
+    /// Copy of the extinction in 1/m, float32 of shape (nz, ny, nx).
     #[getter]
     fn extinction<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let [nx, ny, nz] = self.0.size();
         array(py, self.0.extinction().to_vec(), &[nz, ny, nx])
     }
 
-    /// Lowest and highest corner in world metres.
+    /// Lowest and highest corner of the box in world metres.
     #[getter]
     fn bounds(&self) -> ((f64, f64, f64), (f64, f64, f64)) {
         let [low, high] = self.0.bounds();
@@ -325,7 +347,7 @@ impl DensityGrid {
         (nz, ny, nx)
     }
 
-    /// Plain values by name: extinction as nested lists.
+    /// Built-in Python values by name; extinction as nested lists.
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let dict = PyDict::new(py);
         dict.set_item("extinction", self.extinction(py)?.call_method0("tolist")?)?;
@@ -350,17 +372,17 @@ impl DensityGrid {
     }
 }
 
-/// FNV-1a.
+/// FNV-1a hash.
 fn fnv(words: impl Iterator<Item = u64>) -> u64 {
     words.fold(0xcbf2_9ce4_8422_2325, |hash, v| (hash ^ v).wrapping_mul(0x0100_0000_01b3))
 }
 
-/// A float32 array of `shape` that takes over `data` without a copy.
+/// Array of `shape` that takes over `data` without a copy.
 fn array<'py, T: numpy::Element>(py: Python<'py>, data: Vec<T>, shape: &[usize]) -> PyResult<Bound<'py, PyAny>> {
     Ok(PyArray1::from_vec(py, data).reshape(shape.to_vec())?.into_any())
 }
 
-/// World points of shape (N, 3) from any array-like.
+/// World points of shape (N, 3) from an array-like.
 fn points_from_python(py: Python<'_>, points: &Bound<'_, PyAny>) -> PyResult<Vec<[f64; 3]>> {
     let allowed = "an array of finite numbers of shape (N, 3), world metres within 2e8 of the origin";
     let points = numbers_from_python::<f64>("points", points, allowed, &[&[None, Some(3)], &[Some(0), Some(3)]], &[])?;
@@ -371,6 +393,7 @@ fn points_from_python(py: Python<'_>, points: &Bound<'_, PyAny>) -> PyResult<Vec
     Ok(numbers.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect())
 }
 
+/// The renderer behind `nubis.Renderer`, without defaults.
 #[pyclass(frozen, module = "nubis._nubis")]
 struct Renderer {
     core: Mutex<CoreRenderer>,
@@ -384,7 +407,7 @@ impl Renderer {
     }
 }
 
-/// The user's scene, from arrays that Python has checked.
+/// User-supplied scene from arrays that the Python layer has checked.
 fn scene_from_python<'a>(
     depth: Option<&'a PyReadonlyArrayDyn<'_, f32>>,
     color: Option<&'a PyReadonlyArrayDyn<'_, f32>>,
@@ -410,17 +433,16 @@ impl Renderer {
         Ok(Self { core: Mutex::new(core), width, height })
     }
 
-    #[expect(clippy::too_many_arguments, reason = "what a still depends on")]
     fn render<'py>(
         &self,
-        py: Python<'py>,
         camera: Camera,
-        params: &Bound<'_, PyAny>,
+        params: &Bound<'py, PyAny>,
         time: f64,
         background: bool,
         scene_depth: Option<PyReadonlyArrayDyn<'py, f32>>,
         scene_color: Option<PyReadonlyArrayDyn<'py, f32>>,
     ) -> PyResult<Bound<'py, PyAny>> {
+        let py = params.py();
         let _inside = exit::enter(py);
         let params: Params = params_from_python(params)?;
         let scene = scene_from_python(scene_depth.as_ref(), scene_color.as_ref())?;
@@ -429,6 +451,7 @@ impl Renderer {
         array(py, picture.image, &self.shape(&[4]))
     }
 
+    /// Clouds with alpha, sky, depth (-1 without clouds), density evaluations, uncertainty.
     fn render_layers<'py>(
         &self,
         py: Python<'py>,
@@ -453,17 +476,16 @@ impl Renderer {
         (image, sky, depth, samples, uncertainty).into_pyobject(py)
     }
 
-    #[expect(clippy::too_many_arguments, reason = "what a frame depends on")]
     fn animate<'py>(
         &self,
-        py: Python<'py>,
         camera: Camera,
-        params: &Bound<'_, PyAny>,
+        params: &Bound<'py, PyAny>,
         time: f64,
         background: bool,
         scene_depth: Option<PyReadonlyArrayDyn<'py, f32>>,
         scene_color: Option<PyReadonlyArrayDyn<'py, f32>>,
     ) -> PyResult<Bound<'py, PyAny>> {
+        let py = params.py();
         let _inside = exit::enter(py);
         let params: Params = params_from_python(params)?;
         let scene = scene_from_python(scene_depth.as_ref(), scene_color.as_ref())?;
@@ -509,6 +531,7 @@ impl Renderer {
         Ok(PyArray1::from_vec(py, answers))
     }
 
+    /// Optical depth of all clouds along rays from the eye; -1 where the ground is hit.
     fn depth_along<'py>(
         &self,
         py: Python<'py>,
@@ -526,17 +549,16 @@ impl Renderer {
         Ok(PyArray1::from_vec(py, answers))
     }
 
-    #[expect(clippy::too_many_arguments, reason = "where and how fine the map is")]
     fn shadow_map<'py>(
         &self,
-        py: Python<'py>,
-        params: &Bound<'_, PyAny>,
+        params: &Bound<'py, PyAny>,
         time: f64,
         center: [f64; 2],
         altitude: f64,
         extent: f64,
         size: u32,
     ) -> PyResult<Bound<'py, PyAny>> {
+        let py = params.py();
         let _inside = exit::enter(py);
         let params: Params = params_from_python(params)?;
         let map = detached(py, |interrupt| {
@@ -545,6 +567,7 @@ impl Renderer {
         array(py, map, &[size as usize, size as usize])
     }
 
+    /// Weather map that the march reads: coverage, type, precipitation; shape (H, W, 3).
     fn weather_map<'py>(&self, py: Python<'py>, params: &Bound<'_, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let _inside = exit::enter(py);
         let params: Params = params_from_python(params)?;
@@ -552,17 +575,16 @@ impl Renderer {
         array(py, texels, &[height as usize, width as usize, 3])
     }
 
-    #[expect(clippy::too_many_arguments, reason = "what an answer depends on")]
     fn probe<'py>(
         &self,
-        py: Python<'py>,
         imports: Vec<String>,
         expression: &str,
         inputs: Vec<[f32; 4]>,
-        params: &Bound<'_, PyAny>,
+        params: &Bound<'py, PyAny>,
         eye: [f64; 3],
         time: f64,
     ) -> PyResult<Bound<'py, PyAny>> {
+        let py = params.py();
         let _inside = exit::enter(py);
         let params: Params = params_from_python(params)?;
         let answers = detached(py, |interrupt| {
@@ -572,7 +594,7 @@ impl Renderer {
         array(py, answers.into_flattened(), &[count, 4])
     }
 
-    /// Submissions to the device so far, and how often one was waited for.
+    /// Numbers of submissions to the device and of waits for them so far.
     fn counters(&self, py: Python<'_>) -> [u64; 2] {
         unlocked(py, || lock(&self.core).gpu().counters())
     }
@@ -581,6 +603,7 @@ impl Renderer {
         unlocked(py, || lock(&self.core).timings.0.clone())
     }
 
+    /// GPU memory after the last picture: owner, variable and bytes of each resource.
     fn memory(&self, py: Python<'_>) -> Vec<(&'static str, &'static str, u64)> {
         unlocked(py, || lock(&self.core).memory())
     }
@@ -607,7 +630,7 @@ fn adapters(py: Python<'_>) -> PyResult<Vec<Bound<'_, PyDict>>> {
     infos.iter().map(|info| adapter_to_python(py, info)).collect()
 }
 
-/// The value in the type that the field `name` of the block class `type_name` holds, or `ParameterError`.
+/// The value converted to the type of a field of a block, or `ParameterError`.
 #[pyfunction]
 fn check<'py>(
     py: Python<'py>,
@@ -623,7 +646,7 @@ fn check<'py>(
     value_to_python(py, &value)
 }
 
-/// Checks what no single field can: `clouds.top` above `clouds.base`, and the like.
+/// Checks constraints between fields, such as `clouds.top` above `clouds.base`.
 #[pyfunction]
 fn check_params(params: &Bound<'_, PyAny>) -> PyResult<()> {
     let py = params.py();
@@ -637,14 +660,14 @@ fn check_quality(quality: &Bound<'_, PyAny>) -> PyResult<()> {
     raise(quality.py(), quality_from_python(quality)?.check())
 }
 
-/// The fields of the named numerical method.
+/// Fields of a named numerical method.
 #[pyfunction]
 fn quality<'py>(py: Python<'py>, name: &Bound<'py, PyString>) -> PyResult<Bound<'py, PyDict>> {
     let quality = raise(py, Quality::named(&name.to_string_lossy()))?;
     fields(py, &quality)
 }
 
-/// The values of a block by name.
+/// Values of a block by name.
 fn fields<'py>(py: Python<'py>, block: &dyn schema::Block) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
     for (index, field) in block.fields().iter().enumerate() {
@@ -653,13 +676,14 @@ fn fields<'py>(py: Python<'py>, block: &dyn schema::Block) -> PyResult<Bound<'py
     Ok(dict)
 }
 
-/// The fields of the drift with which a sky goes on from another.
+/// Fields of the drift with which a sky continues the motion of another at a time.
 #[pyfunction]
 fn drift_after<'py>(params: &Bound<'py, PyAny>, before: &Bound<'py, PyAny>, time: f64) -> PyResult<Bound<'py, PyDict>> {
     fields(params.py(), &params_from_python(params)?.after(&params_from_python(before)?, time))
 }
 
-/// The fields of the drift of a sky that has carried things so far at a time, beside the drift that it has.
+/// Fields of the drift of a sky whose displacements at a time, without its own drift, are
+/// `carried`.
 #[pyfunction]
 fn drift_of<'py>(params: &Bound<'py, PyAny>, time: f64, carried: [f64; NUMBERS]) -> PyResult<Bound<'py, PyDict>> {
     let py = params.py();
@@ -668,13 +692,14 @@ fn drift_of<'py>(params: &Bound<'py, PyAny>, time: f64, carried: [f64; NUMBERS])
     fields(py, &carried.drift_of(&params, time))
 }
 
-/// How far a sky has carried things from 0 s to a time, beside its drift.
+/// Displacements by the winds of a sky from 0 s to a time, without its drift.
 #[pyfunction]
 fn carried(params: &Bound<'_, PyAny>, time: f64) -> PyResult<[f64; NUMBERS]> {
     Ok(Advection::new(&params_from_python(params)?, 0.0, time).numbers())
 }
 
-/// How far things are carried on the way from one sky to another, from `start` to `time`, by a wander that is `swings` ahead.
+/// Displacements by the winds that are interpolated between two skies, from the start of the
+/// span to a time; the wander starts `swings` periods ahead.
 #[pyfunction]
 fn carried_between(
     skies: [Bound<'_, PyAny>; 2],
@@ -688,13 +713,13 @@ fn carried_between(
     detached(py, |_| Between { skies: [&from, &to], span, smooth }.carried(swings, time)).map(|sum| sum.numbers())
 }
 
-/// Whether what winds carry moves alike in two skies.
+/// Whether two skies have the same winds.
 #[pyfunction]
 fn same_winds(a: &Bound<'_, PyAny>, b: &Bound<'_, PyAny>) -> PyResult<bool> {
     Ok(params_from_python(a)?.has_winds_of(&params_from_python(b)?))
 }
 
-/// The number that is given for an argument called `name`, or `ParameterError`.
+/// The value of the argument `name` as a float, or `ParameterError`.
 #[pyfunction]
 fn number(name: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
     number_from_python(name, value)
@@ -738,26 +763,26 @@ fn write_hdr(py: Python<'_>, path: PathBuf, frame: PyReadonlyArrayDyn<'_, f32>) 
     raise(py, files::write_hdr(&path, frame.as_slice()?, [shape[1], shape[0]], shape[2]))
 }
 
-/// Writes a file that takes the place of another when it is whole.
+/// Writes bytes to a file atomically.
 #[pyfunction]
 fn write_bytes(py: Python<'_>, path: PathBuf, bytes: &[u8]) -> PyResult<()> {
     raise(py, files::write_bytes(&path, bytes))
 }
 
-/// `FileError` where a file cannot be written.
+/// Raises `FileError` if a file cannot be written.
 #[pyfunction]
 fn check_target(py: Python<'_>, path: PathBuf) -> PyResult<()> {
     raise(py, files::check_target(&path))
 }
 
-/// The numbers in a PNG, HDR or EXR file.
+/// Pixels of a PNG, HDR or EXR file, shape (H, W, 1) or (H, W, 3).
 #[pyfunction]
 fn read_pixels(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyAny>> {
     let pixels = raise(py, files::read_pixels(&path))?;
     array(py, pixels.data, &[pixels.size[1], pixels.size[0], pixels.channels])
 }
 
-/// The folder of the cache, None where it is off, and how many bytes are in it.
+/// Folder of the disk cache, None if it is off, and its size in bytes.
 #[pyfunction]
 fn cache_usage() -> (Option<PathBuf>, u64) {
     (cache::folder(), cache::size())
@@ -768,7 +793,7 @@ fn clear_cache(py: Python<'_>) -> PyResult<()> {
     raise(py, cache::clear())
 }
 
-/// What the environment should hold before the driver is loaded: name and value.
+/// Environment variables, as names and values, that must be set before the driver is loaded.
 #[pyfunction]
 fn driver_settings() -> Vec<(&'static str, &'static str)> {
     gpu::driver_settings()

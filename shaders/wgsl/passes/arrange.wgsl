@@ -1,7 +1,7 @@
-// Arguments of indirect dispatches: how many workgroups a list needs, or whether a grid is wanted.
+// Arguments of indirect dispatches: workgroup counts for a list, or for a conditional grid.
 #import bindings
 
-// Of a list in slices: an invocation for each. Workgroups along x, y, z, and how many invocations the whole list has.
+// List in slices; each invocation writes one slice: workgroups along x, y and z, and the invocations of the whole list.
 @compute @workgroup_size(64)
 fn arrange_list(@builtin(global_invocation_id) id: vec3u) {
     let slices = arrangement.x;
@@ -15,7 +15,7 @@ fn arrange_list(@builtin(global_invocation_id) id: vec3u) {
     put_arguments(id.x, vec4u(groups, 1u, 1u, invocations));
 }
 
-// Of a grid that is dispatched if a number is not 0.
+// Grid that is dispatched if the count is not 0.
 @compute @workgroup_size(1)
 fn arrange_grid() {
     let wanted = select(0u, 1u, list_count != 0u);

@@ -1,4 +1,4 @@
-// Puts the clouds, seen through the air, before the sky: what the caller gets.
+// Compositing: clouds, seen through the air, over the background.
 #import bindings
 #import workgroups
 #import camera
@@ -9,22 +9,25 @@
 #import scene_depth
 #import ground_shadow
 
-override HIGH: bool = true; // there are high clouds
-override CLOUDLESS: bool = false; // nothing has been marched
-override GROUND_SHADOW: bool = false; // clouds cast shadows on the ground in sight
-override LAYERS: bool = true; // the sky and the depth are asked for
-override DISCS: bool = false; // the pixels of a disc of light (disc.wgsl)
+override HIGH: bool = true; // high clouds
+override CLOUDLESS: bool = false; // no marched clouds
+override GROUND_SHADOW: bool = false; // cloud shadows on the visible ground
+override LAYERS: bool = true; // background radiance and depth are outputs too
+override DISCS: bool = false; // pixels of a disc of sun or moon (disc.wgsl)
 override WIDE: bool = false; // the sky varies within a pixel
 
-// Second difference between corners of cells past which each pixel of a cell is worked out, as a share of the contrast past
-// which clouds are marched, of the brightest corner: of brightness, of the transmittance of the high clouds, and of the
-// brightness behind those, which in wide smooth gradients errs the same way for many pixels. What is smooth errs by an
-// eighth of it.
+// Thresholds on the second difference between corners of cells, above which each pixel of a cell is evaluated, relative
+// to the threshold of adaptive sampling. They hold for the brightness of the background and the high clouds (relative
+// to the brightest corner), the transmittance of the high clouds, and the brightness of the background alone (relative
+// to the brightest corner). The third is lower, as in wide smooth gradients the errors of many pixels have the same
+// sign. Interpolation of a smooth function errs by an eighth of its second difference.
 const CURVATURE = vec3f(0.1, 0.1, 0.05);
-// Most of the high clouds between corners, in tiles of their texture, and of shadows on the ground, in their texels.
+// Maximum spacing of corners on the high clouds, in tiles of their texture, and on shadows on the ground, in texels of
+// the shadow clipmap.
 const FIBRE = 0.02;
 const SHADOW_EDGE = 2.0;
-// What stands for the distance of high clouds where a cell is wider than what they vary by, and where it may hide an edge, m.
+// Markers in place of the distance of the high clouds, m: FINE if a cell is wider than the variation of high clouds or
+// shadows, EDGE if it may contain an edge.
 const FINE = 1e20;
 const EDGE = 1e30;
 
@@ -41,7 +44,7 @@ fn composite(
     compose(vec2u(id.x, dispatch.first_row + id.y));
 }
 
-// The pixels that discs of light are seen in: those of `columns` columns from `first_column` on, around a panorama.
+// Pixels with discs of light: `columns` columns from `first_column` on; a panorama wraps around.
 @compute @workgroup_size(8, 8)
 fn composite_discs(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= dispatch.columns || id.y >= dispatch.rows {
@@ -50,7 +53,7 @@ fn composite_discs(@builtin(global_invocation_id) id: vec3u) {
     compose(vec2u((dispatch.first_column + id.x) % frame.view.width, dispatch.first_row + id.y));
 }
 
-// A pixel of the picture.
+// Composites a pixel.
 fn compose(pixel: vec2u) {
     let index = (pixel.y - dispatch.strip_row) * frame.view.width + pixel.x;
     let view = view_direction(vec2f(pixel) + 0.5);
@@ -67,14 +70,14 @@ fn compose(pixel: vec2u) {
     let scene = scene_distance(pixel);
     var sight = sight_of(view.xyz, vec2f(pixel), pixel, scene, here);
     if DISCS {
-        // As `discs` has left it there.
+        // Discs, as stored by the kernel `discs`.
         sight.background += select(image[index].rgb, vec3f(0.0), scene < NO_SCENE);
     }
     write_pixel(index, sight);
 }
 
-// Radiance of the air in a wide pixel, the mean: the glow around the sun is narrower than it. On the side of the horizon that its
-// middle is on.
+// Mean radiance of the air in a wide pixel: the glow around the sun is narrower than the pixel. The mean is over the
+// part of the pixel on the same side of the horizon as its centre.
 fn wide_sky(direction: vec3f, corner: vec2f, grounded: bool) -> vec3f {
     if !WIDE {
         return sky_radiance(direction);
@@ -93,7 +96,7 @@ fn wide_sky(direction: vec3f, corner: vec2f, grounded: bool) -> vec3f {
     return select(sky_radiance(direction), sum / max(whole, 1e-30), whole > 0.0);
 }
 
-// What has been marched at the corners of a cell of a sparse picture.
+// Samples of the marched clouds at the corners of a cell, at low resolution.
 struct CellSamples {
     clouds: mat4x4f,
     distance: mat4x2f, // weight times depth, weight
@@ -104,7 +107,12 @@ fn cell_samples(cell: vec2u) -> CellSamples {
     if LOW_RESOLUTION && !CLOUDLESS {
         let columns = sample_count().x;
         let first = cell.y * columns + cell.x;
-        found.clouds = mat4x4f(clouds[first], clouds[first + 1u], clouds[first + columns], clouds[first + columns + 1u]);
+        found.clouds = mat4x4f(
+            clouds[first],
+            clouds[first + 1u],
+            clouds[first + columns],
+            clouds[first + columns + 1u],
+        );
         found.distance = mat4x2f(
             weighted_depth(first),
             weighted_depth(first + 1u),
@@ -120,7 +128,8 @@ fn weighted_depth(index: u32) -> vec2f {
     return depth_weight(clouds[index].a, depth) * vec2f(depth, 1.0);
 }
 
-// What has been marched at a pixel of a cell, or lies between its corners; its distance as it is.
+// Marched clouds at a pixel of a cell, at low resolution interpolated between the corners. The distance is not
+// premultiplied.
 fn marched_layer(cell: vec2u, samples: CellSamples, i: u32) -> Layer {
     if CLOUDLESS {
         return Layer(vec3f(0.0), 1.0, 0.0);
@@ -147,20 +156,22 @@ fn write_pixel(index: u32, sight: Sight) {
     image[index] = select(clouds_alone, whole, frame.view.background > 0u);
 }
 
-// What is behind the marched clouds is smooth nearly everywhere, and is worked out at the corners of cells. Most of what
-// bends between them are high clouds and the shadows on the ground: in fine cells those are worked out at each pixel, and sky,
-// ground and air between the corners. Where these bend too, or may have an edge, a pixel is worked out as a whole.
+// The background of the marched clouds is smooth nearly everywhere, and is evaluated at the corners of cells. Most
+// curvature between corners is in the high clouds and the shadows on the ground. In fine cells these two are evaluated
+// at each pixel, and sky, ground and air are interpolated. Where these are curved too, or may have an edge, the pixels
+// of the cell are evaluated in full.
 
 fn cell_columns() -> u32 {
     return (frame.view.width + TILE - 1u) / TILE;
 }
 
-// Cells have a corner more than there are in each direction, and their neighbours one on either side.
+// Cells have one corner more than their number in each direction, and their neighbours one more on either side.
 fn corner_index(corner: vec2u) -> u32 {
     return corner.y * (cell_columns() + 3u) + corner.x;
 }
 
-// What is behind the marched clouds, and the user's scene, at the corners of the cells of a sheet and of those around it.
+// Background of the marched clouds, without the user's scene, at the corners of the cells of a strip and of the cells
+// around it.
 @compute @workgroup_size(8, 8)
 fn background_corners(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= cell_columns() + 3u || id.y >= (dispatch.rows + TILE - 1u) / TILE + 3u {
@@ -194,7 +205,7 @@ fn background_corners(@builtin(global_invocation_id) id: vec3u) {
     );
 }
 
-// Whether corners so far apart may miss high clouds, or shadows on the ground, between them.
+// Whether corners are so far apart that they may miss high clouds, or shadows on the ground, between them.
 fn is_fine(direction: vec3f, ground: Hit) -> bool {
     var fine = false;
     if HIGH {
@@ -213,13 +224,13 @@ fn is_fine(direction: vec3f, ground: Hit) -> bool {
     return fine;
 }
 
-// How far a cell reaches along a sphere that its ray meets at a distance, m.
+// Extent of a cell along a sphere, at the distance where its ray meets the sphere, m.
 fn cell_across(direction: vec3f, distance: f32, altitude: f32) -> f32 {
     let cosine = abs(cos_zenith_along(direction, distance, altitude));
     return distance * f32(TILE) * pixel_width(direction) / max(cosine, 1e-6);
 }
 
-// Puts the clouds of a cell before what lies behind them, or lists it.
+// Composites the pixels of a cell, or adds the cell to the list.
 @compute @workgroup_size(8, 8)
 fn composite_cells(
     @builtin(workgroup_id) group: vec3u,
@@ -232,7 +243,7 @@ fn composite_cells(
         return;
     }
     let first = vec2u(id.x * TILE, dispatch.strip_row + id.y * TILE);
-    // Written out: lavapipe keeps in memory what a loop indexes.
+    // Unrolled: lavapipe keeps arrays that a loop indexes in memory.
     let c0 = corner_index(id.xy + 1u);
     let c1 = c0 + 1u;
     let c2 = corner_index(id.xy + vec2u(1u, 2u));
@@ -241,11 +252,11 @@ fn composite_cells(
     let behind = mat4x4f(corners[c0][1], corners[c1][1], corners[c2][1], corners[c3][1]);
     let air = mat4x4f(corners[c0][2], corners[c1][2], corners[c2][2], corners[c3][2]);
     let haze = mat4x4f(corners[c0][3], corners[c1][3], corners[c2][3], corners[c3][3]);
-    let v0 = vec3f(air[0].w, layers[0].w, haze[0].w); // as `varied`
+    let v0 = vec3f(air[0].w, layers[0].w, haze[0].w); // equal to `varied`
     let v1 = vec3f(air[1].w, layers[1].w, haze[1].w);
     let v2 = vec3f(air[2].w, layers[2].w, haze[2].w);
     let v3 = vec3f(air[3].w, layers[3].w, haze[3].w);
-    // A bend shows at the corners around too: high clouds near the horizon are lower than a cell.
+    // Curvature is tested at the surrounding corners too: high clouds near the horizon are lower than a cell.
     let above = varied_row(corner_index(id.xy));
     let upper = mat4x3f(varied(c0 - 1u), v0, v1, varied(c1 + 1u));
     let lower = mat4x3f(varied(c2 - 1u), v2, v3, varied(c3 + 1u));
@@ -256,7 +267,7 @@ fn composite_cells(
     let bends = max(along, across) > CURVATURE * params.quality.contrast * vec3f(brightest, 1.0, brightest);
     let nearest = min(min(behind[0].w, behind[1].w), min(behind[2].w, behind[3].w));
     let farthest = max(max(behind[0].w, behind[1].w), max(behind[2].w, behind[3].w));
-    // The horizon is an edge, however bright.
+    // The horizon is an edge at any brightness.
     let grounded = farthest < 0.0;
     var edge = farthest >= EDGE || (nearest < 0.0) != grounded || bends.z;
     if SCENE {
@@ -264,7 +275,7 @@ fn composite_cells(
     }
     let fine = !edge && (max(farthest, -nearest) >= FINE || any(bends));
     let samples = cell_samples(id.xy);
-    // It does not matter what opaque clouds hide, but to who asks for the sky.
+    // Pixels behind opaque clouds need no background, unless it is an output.
     var hidden = false;
     if !LAYERS && !CLOUDLESS {
         hidden = (edge || fine) && (!HIGH || (!VOLUME && frame.sky.shell_top <= params.high_clouds.altitude));
@@ -274,8 +285,8 @@ fn composite_cells(
     if !LOW_RESOLUTION && !LAYERS && !CLOUDLESS {
         let last = vec2u(frame.view.width, dispatch.strip_row + dispatch.rows) - 1u;
         var i = 0u;
-        // It leaves soon: most cells show something, and those that do not ask are never hidden. Once false, it stays so,
-        // whatever lavapipe computes for a cell that has left.
+        // The loop ends early: most cells have a visible background, and smooth cells start with false. Once false,
+        // `hidden` stays false, whatever lavapipe computes for a cell that has left the loop.
         loop {
             let pixel = min(cell_pixel(first, i), last);
             hidden = hidden && clouds[(pixel.y - dispatch.strip_row) * frame.view.width + pixel.x].a == 0.0;
@@ -285,8 +296,8 @@ fn composite_cells(
             }
         }
     }
-    // Three loops, as cells side by side, which lavapipe runs together, are mostly of one kind: those of the others have one
-    // turn for them, where a branch would be run in full.
+    // Each kind of cell has its own loop. Neighbouring cells, which lavapipe runs together, are mostly of one kind:
+    // loops of the other kinds have one iteration for them, whereas a branch would be run in full.
     let fine_high = HIGH && fine && !hidden && !grounded;
     let fine_ground = GROUND_SHADOW && fine && !hidden && grounded;
     let smooth_cell = !fine_high && !fine_ground;
@@ -295,12 +306,18 @@ fn composite_cells(
         if smooth_cell && in_strip(first, i) {
             let layer = layers * corner_shares(i);
             let sky = behind * corner_shares(i);
-            // Before the ground there is the lack of light in the shadows; and what is hidden may have both at its corners.
+            // On the ground `layer` is minus the radiance that shadows remove. Hidden cells may have high clouds at
+            // some corners and ground at others, and are composited without a layer.
             var high = Layer(select(layer.rgb, vec3f(0.0), grounded), layer.a, sky.w);
             if hidden {
                 high = Layer(vec3f(0.0), 1.0, 0.0);
             }
-            put_behind(strip_index(first, i), marched_layer(id.xy, samples, i), high, sky.rgb + select(vec3f(0.0), layer.rgb, grounded));
+            put_behind(
+                strip_index(first, i),
+                marched_layer(id.xy, samples, i),
+                high,
+                sky.rgb + select(vec3f(0.0), layer.rgb, grounded),
+            );
         }
         i++;
         if i >= select(1u, TILE * TILE, smooth_cell) {
@@ -316,7 +333,12 @@ fn composite_cells(
                 let layer = high_layer(direction, hit_sphere(direction, frame.view.power_high).far, true, turned);
                 let shares = corner_shares(n);
                 let before = Air((air * shares).rgb, (haze * shares).rgb);
-                put_behind(strip_index(first, n), marched_layer(id.xy, samples, n), through_air(layer, before), (behind * shares).rgb);
+                put_behind(
+                    strip_index(first, n),
+                    marched_layer(id.xy, samples, n),
+                    through_air(layer, before),
+                    (behind * shares).rgb,
+                );
             }
             n++;
             if n >= select(1u, TILE * TILE, fine_high) {
@@ -346,8 +368,8 @@ fn composite_cells(
     }
 }
 
-// What varies between corners: the brightness of all that is behind the marched clouds, the transmittance of the high ones,
-// and the brightness without those, or without shadows.
+// Tested quantities of a corner: brightness of high clouds and background together, transmittance of the high clouds,
+// brightness of the background without high clouds and shadows.
 fn varied(corner: u32) -> vec3f {
     return vec3f(corners[corner][2].w, corners[corner][0].w, corners[corner][3].w);
 }
@@ -356,7 +378,7 @@ fn varied_row(first: u32) -> mat4x3f {
     return mat4x3f(varied(first), varied(first + 1u), varied(first + 2u), varied(first + 3u));
 }
 
-// The largest second difference in a row of corners, and across three.
+// Maximum second difference along a row of four corners, and across three rows.
 fn bend_along(row: mat4x3f) -> vec3f {
     return max(abs(row[0] - 2.0 * row[1] + row[2]), abs(row[1] - 2.0 * row[2] + row[3]));
 }
@@ -366,7 +388,7 @@ fn bend_across(a: mat4x3f, b: mat4x3f, c: mat4x3f) -> vec3f {
     return max(max(abs(bend[0]), abs(bend[1])), max(abs(bend[2]), abs(bend[3])));
 }
 
-// The pixel of a number of the cell that begins at `first`.
+// Pixel `i` of the cell that begins at `first`.
 fn cell_pixel(first: vec2u, i: u32) -> vec2u {
     return first + vec2u(i % TILE, i / TILE);
 }
@@ -380,14 +402,14 @@ fn strip_index(first: vec2u, i: u32) -> u32 {
     return (pixel.y - dispatch.strip_row) * frame.view.width + pixel.x;
 }
 
-// Shares of a cell's corners in a pixel.
+// Interpolation weights of a cell's corners at pixel `i`.
 fn corner_shares(i: u32) -> vec4f {
     let share = vec2f(vec2u(i % TILE, i / TILE)) / f32(TILE);
     let rest = 1.0 - share;
     return vec4f(rest.x * rest.y, share.x * rest.y, rest.x * share.y, share.x * share.y);
 }
 
-// Puts a pixel: what was marched there before or behind the high clouds, and what is behind both.
+// Writes a pixel: marched clouds in front of or behind the high clouds, both in front of the background.
 fn put_behind(index: u32, here: Layer, high: Layer, background: vec3f) {
     var seen = high;
     if !CLOUDLESS {
@@ -407,7 +429,7 @@ fn put_behind(index: u32, here: Layer, high: Layer, background: vec3f) {
     write_pixel(index, sight_to(seen, background));
 }
 
-// How near the user's scene comes in a cell.
+// Smallest distance of the user's scene in a cell, m.
 fn nearest_scene(first: vec2u) -> f32 {
     let last = vec2u(frame.view.width, dispatch.strip_row + dispatch.rows) - 1u;
     var nearest = NO_SCENE;
@@ -417,7 +439,7 @@ fn nearest_scene(first: vec2u) -> f32 {
     return nearest;
 }
 
-// The pixels of the cells of the list.
+// Pixels of the listed cells.
 @compute @workgroup_size(LIST_GROUP)
 fn composite_list(@builtin(global_invocation_id) id: vec3u) {
     let number = dispatch.first_ray + id.x;
@@ -432,24 +454,24 @@ fn composite_list(@builtin(global_invocation_id) id: vec3u) {
     }
 }
 
-// What a pixel sees: all clouds, what is behind them, and how much of that is ours to say.
+// Pixel before it is written: layer of all clouds, background radiance, alpha of the output.
 struct Sight {
     seen: Layer,
     background: vec3f,
     opacity: f32,
-    // What is smooth where high clouds and shadows are not.
-    high_air: Air, // before the high clouds
-    sunlight: vec3f, // that clouds may keep from the ground, as the eye sees it
-    shadow: vec3f, // how much of it they do
+    // Values for the corners of cells: air and sunlight are smooth where high clouds and shadows are not.
+    high_air: Air, // in front of the high clouds
+    sunlight: vec3f, // reflected sunlight that clouds may block, seen through the air
+    shadow: vec3f, // part of `sunlight` that clouds block
 }
 
-// Clouds and what is behind them.
+// Pixel of clouds in front of a background.
 fn sight_to(seen: Layer, background: vec3f) -> Sight {
     return Sight(seen, background, 1.0, Air(vec3f(1.0), vec3f(0.0)), vec3f(0.0), vec3f(0.0));
 }
 
-// What is seen in a direction, with the clouds that were marched there, to the user's scene at a pixel. `corner` is that of the
-// pixel that looks there.
+// Pixel at a direction, up to the distance of the user's scene. `corner` is the corner of the pixel at the direction,
+// `here` the marched clouds.
 fn sight_of(direction: vec3f, corner: vec2f, pixel: vec2u, scene: f32, here: Layer) -> Sight {
     let ground = hit_sphere(direction, frame.view.power_ground);
     var way = AirSegment(0.0, 0.0, ground.enters);
@@ -463,11 +485,15 @@ fn sight_of(direction: vec3f, corner: vec2f, pixel: vec2u, scene: f32, here: Lay
         air = whole_air(direction, way, texels, sky_behind);
     }
 
-    // The march has seen them through the air.
-    var found = sight_to(Layer(here.radiance, here.transmittance, (1.0 - here.transmittance) * here.distance), air.radiance);
+    // The marched clouds include the air in front of them.
+    var found = sight_to(
+        Layer(here.radiance, here.transmittance, (1.0 - here.transmittance) * here.distance),
+        air.radiance,
+    );
     if HIGH {
-        // The high clouds where the ray enters their sphere, which it cannot from inside, and where it leaves it; each
-        // before or behind the clouds. The loop costs lavapipe one of the two where there is one, a branch both.
+        // High clouds at both crossings of their sphere, each in front of or behind the marched clouds. From inside
+        // there is one crossing, where the ray leaves. lavapipe runs one iteration of the loop for it; with a branch it
+        // would evaluate both crossings.
         let high = hit_sphere(direction, frame.view.power_high);
         let turned = seen_turn(direction, corner);
         var before = Layer(vec3f(0.0), 1.0, 0.0);
@@ -506,7 +532,7 @@ fn sight_of(direction: vec3f, corner: vec2f, pixel: vec2u, scene: f32, here: Lay
         let before = air_to(direction, scene, way, texels, sky_behind);
         found.background = through_air(Layer(bright, 0.0, scene), before).radiance;
         if frame.view.scene_lit == 0u {
-            // The caller puts a scene of his own behind: what he adds is dimmed by cloud and air.
+            // The caller blends the picture with a scene, which is dimmed by clouds and air.
             let white = through_air(Layer(vec3f(1.0), 0.0, scene), before).radiance;
             found.opacity = 1.0 - found.seen.transmittance * dot(white - found.background, LUMINANCE);
         }
@@ -514,12 +540,12 @@ fn sight_of(direction: vec3f, corner: vec2f, pixel: vec2u, scene: f32, here: Lay
     return found;
 }
 
-// Sunlight that the ground sends on and clouds may keep from it, as in `ground_radiance`.
+// Reflected sunlight of the ground that clouds may block, part of `ground_radiance`.
 fn kept_sunlight(mu: f32) -> vec3f {
     return (1.0 - PASSED_ON) * params.atmosphere.ground_albedo / PI * sun_irradiance(0.0, mu) * max(mu, 0.0);
 }
 
-// How much sun reaches a point on the ground through all clouds.
+// Transmittance of all clouds toward the sun at a point of the ground.
 fn ground_sun(p: vec3f, mu: f32) -> f32 {
     var sun = 1.0;
     if !CLOUDLESS {
@@ -531,7 +557,7 @@ fn ground_sun(p: vec3f, mu: f32) -> f32 {
     return sun;
 }
 
-// The air before a distance on a ray, if there is any.
+// Air in front of a distance on a ray; none without atmosphere.
 fn air_to(direction: vec3f, distance: f32, way: AirSegment, texels: AirTexels, sky: vec3f) -> Air {
     if AIR {
         return air_before(direction, distance, way, texels, sky);
@@ -539,7 +565,7 @@ fn air_to(direction: vec3f, distance: f32, way: AirSegment, texels: AirTexels, s
     return Air(vec3f(1.0), vec3f(0.0));
 }
 
-// A layer behind the air in front of it.
+// Layer seen through the air in front of it.
 fn through_air(layer: Layer, air: Air) -> Layer {
     let opacity = 1.0 - layer.transmittance;
     return Layer(

@@ -1,10 +1,10 @@
-// Radiance of the discs of sun and moon in the pixels that they cover, without clouds. `composite_discs` reads it from the
-// picture and puts the clouds before it. The kernel depends on the projection alone: as a part of `composite_discs` it took
-// 4 s of compilation for every new mixture of switches (Mesa 22.3, two cores).
+// Radiance of the discs of sun and moon in the pixels that they cover, without clouds. `composite_discs` reads it from
+// `image` and composites the clouds over it. The kernel is specialized by the projection alone: as part of
+// `composite_discs` it took 4 s of compilation for each new specialization (Mesa 22.3, two cores).
 #import bindings
 #import disc
 
-// `columns` columns from `first_column` on, around a panorama.
+// Range of `columns` columns from `first_column` on; a panorama wraps around.
 @compute @workgroup_size(8, 8)
 fn discs(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= dispatch.columns || id.y >= dispatch.rows {

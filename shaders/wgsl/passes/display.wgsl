@@ -1,4 +1,5 @@
-// Shows a picture on a screen, in 8 bits: exposure and tone map, as color.rs does for pictures in memory.
+// Display of a picture in a window, in 8 bits: exposure and tone map, equal to those of color.rs for pictures in
+// memory.
 #import bindings
 #import color
 
@@ -8,7 +9,7 @@ fn display(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= frame.view.width || id.y >= dispatch.rows {
         return;
     }
-    // Exposure as a factor, and which of color.rs's TONE_MAPS.
+    // `shown` is the exposure as a factor, and the index of a tone map in TONE_MAPS of color.rs.
     let radiance = shown.x * image[pixel.y * frame.view.width + pixel.x].rgb;
     var color = encode_srgb(radiance);
     if shown.y == 0.0 {
@@ -16,7 +17,8 @@ fn display(@builtin(global_invocation_id) id: vec3u) {
     } else if shown.y == 1.0 {
         color = aces(radiance);
     }
-    // Half a step of blue noise to each side, as color.rs adds it: the store rounds. A rank is that below its point.
+    // Dither by half a step of blue noise to either side, equal to that of color.rs; the store rounds. Ranks are the
+    // lower ends of their intervals, hence half an interval is added.
     let noise = textureLoad(blue_noise, pixel % BLUE_SIZE, 0).r + 0.5 / f32(BLUE_SIZE * BLUE_SIZE) - 0.5;
     textureStore(screen, pixel, vec4f(color + noise / 255.0, 1.0));
 }

@@ -1,30 +1,32 @@
-// Bakes the texture of the high clouds: octaves of noise that are replaced at their own rates (gems2001), of two
-// patterns: the streaks of cirrus and the cells of altocumulus.
+// Bakes the texture of the high clouds: octaves of noise, each replaced at its own rate (gems2001), of two patterns,
+// the streaks of cirrus and the cells of altocumulus.
 #import bindings
 #import gradient_noise
 
-// Cells of the largest octave in a tile: of streaks, and puffs.
+// Cells per tile of the largest octave: of streaks, and of altocumulus cells.
 const STREAKS = 4u;
 const CELLS = 12u;
-// Cells in a tile of the patches that puffs stand in, of what bends streaks and rows, of what hooks streaks, and of where a
-// type between the two ends has more of one or of the other.
+// Cells per tile of low-frequency noises: patches of altocumulus, the displacement of streaks and rows, the hooks of
+// streaks, and the variation of the type between streaks and cells.
 const PATCHES = 3u;
 const SWIRLS = 3u;
 const HOOKS = 8u;
 const BLENDS = 2u;
-// How far swirls and hooks displace, for a noise of 1, in tiles.
+// Displacement by swirls and hooks, in tiles, at a noise of 1.
 const SWIRL = 0.1;
 const HOOK = 0.015;
 
-// By how much the patterns differ from 0.5 for noises of 1, set by eye: streaks as deep as in the first version of this
-// layer, which had five octaves with 0.62 of the amplitude of the one before; puffs with gaps between them.
+// Contrast of the patterns: deviation from 0.5 at a noise of 1, set by eye. Streaks are as deep as in the first version
+// of this layer, which had five octaves, each with 0.62 of the amplitude of the one before. Altocumulus cells have
+// gaps.
 const STREAK_CONTRAST = 0.387;
 const CELL_CONTRAST = 0.774;
 const PATCH_CONTRAST = 0.45;
-// By how much the type differs from place to place where it is halfway.
+// Amplitude of the variation of the type where it is halfway.
 const BLEND_CONTRAST = 1.6;
 
-// Numbers of noises, to which an octave adds up to 49 and a multiple of 977 (`octave_at`): so chosen that no two meet.
+// Salts of the noises. An octave adds up to 49 and a multiple of 977 (`octave_at`); the values are chosen so that no
+// two noises share a salt.
 const SWIRL_SALT = 51u;
 const BLEND_SALT = 53u;
 const HOOK_SALT = 54u;
@@ -46,7 +48,7 @@ fn high_clouds_mixed(@builtin(global_invocation_id) id: vec3u) {
     bake(id, true, true);
 }
 
-// Two texels in each invocation, as one number of the buffer holds them.
+// Each invocation writes two texels, packed into one word of the buffer.
 fn bake(id: vec3u, with_streaks: bool, with_cells: bool) {
     let size = params.high_clouds.texture_size;
     if 2u * id.x >= size || id.y >= size {
@@ -64,11 +66,11 @@ fn bake(id: vec3u, with_streaks: bool, with_cells: bool) {
     texels_out[id.y * packed_row(size) + id.x] = pack2x16float(pair);
 }
 
-// How much of the sky they cover at a place in the tile.
+// Value of the texture at a position in the tile.
 fn cover(uv: vec2f, with_streaks: bool, with_cells: bool) -> f32 {
     let p = vec3f(uv, 0.5);
     let seed = params.high_clouds.seed * 61u;
-    // Streaks are not ruled lines, and rows bend.
+    // Displacement bends streaks and rows.
     let swirl = vec2f(perlin(p, SWIRLS, seed + SWIRL_SALT), perlin(p, SWIRLS, seed + SWIRL_SALT + 1u));
     let at = uv + SWIRL * swirl;
     var hooked = at;
@@ -77,8 +79,8 @@ fn cover(uv: vec2f, with_streaks: bool, with_cells: bool) -> f32 {
     }
     var streaks = 0.0;
     var cells = 0.0;
-    // The sum over noise(2^i x) / 2^i (gems2001, a = b = 2), not divided by that of the amplitudes: with fewer octaves the
-    // same clouds lack detail.
+    // Sum over noise(2^i x) / 2^i (gems2001, a = b = 2), not normalised by the sum of amplitudes: with fewer octaves
+    // the same clouds lack detail.
     var amplitude = 1.0;
     var i = 0u;
     loop {
@@ -94,14 +96,14 @@ fn cover(uv: vec2f, with_streaks: bool, with_cells: bool) -> f32 {
             cells += amplitude * CELL_CONTRAST * mix(before, after, octave.age) * octave.steady;
         }
         amplitude *= 0.5;
-        // Left at its end: lavapipe runs a loop that is left at its start once more, for nothing.
+        // The test at the end of the loop: lavapipe runs a loop that is tested at its start once more for nothing.
         i++;
         if i >= params.high_clouds.octaves {
             break;
         }
     }
     if with_cells {
-        // They live as long as the largest puffs.
+        // Patches live as long as the largest cells.
         let octave = octave_at(0u);
         let place = vec3f(at, 0.5);
         let before = perlin(place, PATCHES, seed + PATCH_SALT + octave.salts.x);
@@ -120,32 +122,32 @@ fn cover(uv: vec2f, with_streaks: bool, with_cells: bool) -> f32 {
     return saturate(0.5 + mix(streaks, cells, share) * steadied(share));
 }
 
-// By how much a blend of two independent noises varies less than each of them; this times it does not.
+// Factor that restores the variance of a blend of two independent noises.
 fn steadied(share: f32) -> f32 {
     return inverseSqrt(share * share + (1.0 - share) * (1.0 - share));
 }
 
-// Where an octave is between two updates.
+// State of an octave between two updates.
 struct Octave {
-    salts: vec2u, // of the old and of the new
-    age: f32, // 0 at the old, 1 at the new
-    steady: f32, // keeps the variance of the blend
+    salts: vec2u, // of the old and the new update
+    age: f32, // 0 at the old update, 1 at the new one
+    steady: f32, // restores the variance of the blend
 }
 
 fn octave_at(i: u32) -> Octave {
-    // Small octaves are replaced more often; between two updates each fades linearly from the old to the new.
+    // Small octaves are replaced more often. Between two updates an octave fades linearly from the old to the new.
     let age = select(frame.sky.high_age, frame.sky.high_age_small, i >= 4u)[i % 4u];
     let update = u32(select(frame.sky.high_update, frame.sky.high_update_small, i >= 4u)[i % 4u]);
-    // The numbers come round: after the last update comes the first.
+    // Update numbers wrap: the first follows the last.
     let salts = i * 7u + vec2u(update, (update + 1u) % UPDATES) * 977u;
     return Octave(salts, age, steadied(age));
 }
 
-// Largest stretch of an octave, as of the first one at the end of its range.
+// Largest stretch of an octave: the upper end of the parameter's range, which the first octave reaches.
 const MAX_STRETCH = 16.0;
 
-// Perlin noise stretched along x by squeezing its cells across, small octaves more than large ones: they are fibres. Whole
-// cells a tile either way, so it tiles.
+// Perlin noise stretched along x by narrower cells across it. Small octaves are stretched more than large ones: they
+// are fibres. Cell counts along both axes are integers, so that the noise tiles.
 fn streak_noise(p: vec2f, octave: u32, salt: u32) -> f32 {
     let period = f32(STREAKS << octave);
     let stretch = sqrt(min(pow(params.high_clouds.stretch, 1.0 + 0.25 * f32(octave)), MAX_STRETCH));
@@ -165,16 +167,18 @@ fn streak_noise(p: vec2f, octave: u32, salt: u32) -> f32 {
     return 1.4 * mix(mix(corner[0], corner[1], w.x), mix(corner[2], corner[3], w.x), w.y);
 }
 
-// How far apart the points of a cell may lie, cells: less than the 1 of Worley noise, so that puffs stand in rows.
+// Range of the feature points in their cells, in cells. It is less than the 1 of Worley noise, so that altocumulus
+// cells stand in rows.
 const CELL_JITTER = 0.6;
-// Mean distance to the nearest of such points, cells.
+// Mean distance to the nearest feature point, cells.
 const CELL_DISTANCE = 0.388;
 
-// Inverted Worley noise in two dimensions about its mean, of points that nearly stand in rows, each shifted by half a cell
-// against the next, as hexagons are. Longer across than along.
+// Inverted 2D Worley noise about its mean, with feature points nearly in rows. Rows are shifted by half a cell against
+// each other, as in a hexagonal lattice. Cells are longer across the wind than along it.
 fn cell_noise(p: vec2f, period: u32, salt: u32) -> f32 {
     let squeeze = sqrt(sqrt(params.high_clouds.stretch));
-    // An even number of rows, as every other one is shifted. No fewer than six cells in one, which `wrap_cell` asks for.
+    // The number of rows is even, as every other one is shifted. Neither count is below six, so that cells lie at most
+    // one period outside, as `wrap_cell` requires.
     let along = 2u * max(u32(round(0.5 * f32(period) * squeeze)), 1u);
     let across = max(u32(round(f32(period) / squeeze)), 1u);
     let q = fract(p) * vec2f(f32(along), f32(across));

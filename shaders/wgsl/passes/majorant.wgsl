@@ -1,13 +1,14 @@
-// Bakes majorants: the largest density in each cell of the weather map by height, or of the user's grid; then the largest
-// of each cell and its neighbours, so that a step as long as a cell is safe from anywhere in it.
+// Bakes majorants: the largest density in each cell of the weather map and altitude, or of the user's grid. Each is
+// then dilated to the largest of its cell and the neighbours, so that a step as long as a cell is safe from anywhere in
+// it.
 #import bindings
 #import density
 #import majorant
 
-// Half floats round by up to 2^-11: up, then, by more than that.
+// Factor that rounds majorants up by more than the rounding error of half floats, 2^-11.
 const ROUND_UP = 1.001;
 
-// The largest voxel of a brick and of those that its edge is interpolated with.
+// Largest voxel of a brick, and of the voxels with which its boundary is interpolated.
 @compute @workgroup_size(4, 4, 4)
 fn majorant_grid(@builtin(global_invocation_id) id: vec3u) {
     if any(id >= textureDimensions(volume_out)) {
@@ -24,8 +25,8 @@ fn majorant_grid(@builtin(global_invocation_id) id: vec3u) {
     textureStore(volume_out, id, vec4f(ROUND_UP * most));
 }
 
-// No noise is above 1, so what bounds the density is profile and coverage: the largest of each, of all the weather that
-// a cell's points can read.
+// Bound by profile and coverage, as noise is at most 1: the largest of each over all weather that the points of a cell
+// can read.
 @compute @workgroup_size(4, 4, 4)
 fn majorant_weather(@builtin(global_invocation_id) id: vec3u) {
     let size = textureDimensions(volume_out);
@@ -53,7 +54,8 @@ fn majorant_weather(@builtin(global_invocation_id) id: vec3u) {
     let part = vec2f(f32(id.z), f32(id.z + 1u)) / f32(size.z);
     let altitudes = mix(vec2f(frame.sky.shell_base), vec2f(frame.sky.shell_top), part);
     let base = params.clouds.base;
-    // From the lowest that the lower side of the cell can be in its cloud to the highest that its upper side can.
+    // Range of relative heights: from the lowest in a cloud at the lower side of the cell to the highest at its upper
+    // side.
     let heights = vec2f(
         (altitudes.x - base) / (cloud_top(wettest.precipitation) - base),
         (altitudes.y - base) / (cloud_top(driest.precipitation) - base),
@@ -61,7 +63,8 @@ fn majorant_weather(@builtin(global_invocation_id) id: vec3u) {
     let profile = largest_profile(heights, vec2f(driest.kind, wettest.kind), tower(wettest.precipitation));
     var bound = with_coverage(profile, wettest.coverage);
     if RAINY {
-        // The anvil lies at the top; it rises and falls within more than one cell.
+        // The anvil lies at the top. Its rise and its fall are each thicker than a cell, and the full anvil includes a
+        // height of 0.84.
         let spread = max(anvil(wettest.precipitation, altitudes.x), anvil(wettest.precipitation, altitudes.y));
         let middle = mix(params.clouds.base, tallest(), 0.84);
         let whole = altitudes.x < middle && middle < altitudes.y;
@@ -69,7 +72,7 @@ fn majorant_weather(@builtin(global_invocation_id) id: vec3u) {
     }
     if UPPER || RAIN_SHAFTS {
         bound *= frame.sky.share;
-        // No bound but the largest for what has its own weather.
+        // Upper deck and rain, which have weather of their own, are bounded by their largest density.
         let deck = altitudes.y >= params.upper_clouds.base && altitudes.x <= params.upper_clouds.top;
         bound = max(bound, select(0.0, frame.sky.upper_share, UPPER && deck));
         let rain = frame.sky.rain_share * wettest.precipitation;
@@ -78,13 +81,14 @@ fn majorant_weather(@builtin(global_invocation_id) id: vec3u) {
     textureStore(volume_out, id, vec4f(ROUND_UP * bound));
 }
 
-// What lies beyond the edge of the weather map; beside its edge its mirror image begins with the same texels.
+// Texel index beyond the edge of the weather map. For a mirrored map, clamping gives the first texels of the mirror
+// image.
 fn wrapped(at: vec2i, size: vec2i) -> vec2i {
     let repeated = ((at % size) + size) % size;
     return select(clamp(at, vec2i(0), size - 1), repeated, params.weather.edge == EDGE_REPEAT);
 }
 
-// The largest value of `height_profile` between two heights and two types, where it rains so much or less.
+// Largest value of `height_profile` between two heights, between two types, and up to a precipitation.
 fn largest_profile(heights: vec2f, kinds: vec2f, rain: f32) -> f32 {
     if heights.y <= 0.0 || heights.x >= 1.0 {
         return 0.0;
@@ -92,7 +96,7 @@ fn largest_profile(heights: vec2f, kinds: vec2f, rain: f32) -> f32 {
     if PROFILE_TABLE {
         return 1.0;
     }
-    // Where the profile rises and falls goes from stratus to stratocumulus to cumulus to cumulonimbus in straight lines.
+    // Profile edges are piecewise linear in the type, from stratus over stratocumulus to cumulus, and linear in rain.
     let middle = clamp(0.5, kinds.x, kinds.y);
     let a = profile_edges(kinds.x, 0.0);
     let b = profile_edges(middle, 0.0);
@@ -103,13 +107,13 @@ fn largest_profile(heights: vec2f, kinds: vec2f, rain: f32) -> f32 {
         first = min(first, mix(first, params.clouds.cumulonimbus, rain));
         last = max(last, mix(last, params.clouds.cumulonimbus, rain));
     }
-    // It rises to at most that of the earliest rise at the upper height, and falls at least that of the latest fall at
-    // the lower one.
+    // Bound of the rise: that of the earliest rise, at the upper height. Bound of the fall: that of the latest fall, at
+    // the lower height.
     let rise = remap01(heights.y, first.x, first.y);
     return rise * (1.0 - smoothstep(last.z, max(last.w, last.z + 1e-4), heights.x));
 }
 
-// The largest of a cell and its neighbours.
+// Largest of a cell and its neighbours.
 @compute @workgroup_size(4, 4, 4)
 fn majorant_dilate(@builtin(global_invocation_id) id: vec3u) {
     let size = vec3i(textureDimensions(volume_out));

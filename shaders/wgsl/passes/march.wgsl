@@ -1,4 +1,5 @@
-// Marches each pixel's ray through the cloud shell: radiance, transmittance, depth, samples (nubis2015, "march").
+// Ray march through the cloud shell: radiance, transmittance, depth and number of density evaluations of each pixel
+// (nubis2015, "march").
 #import bindings
 #import workgroups
 #import camera
@@ -21,7 +22,7 @@ fn march(
     march_cell((dispatch.first_row - dispatch.strip_row + id.y) * dispatch.march_width + id.x, EVERYWHERE);
 }
 
-// Marches the pixels of a list (passes/refine).
+// March of the ray list (passes/refine).
 @compute @workgroup_size(LIST_GROUP)
 fn march_list(
     @builtin(workgroup_id) group: vec3u,
@@ -33,17 +34,18 @@ fn march_list(
         return;
     }
     let index = active_rays[number];
-    let known = select(EVERYWHERE, cloud_span[index], dispatch.spans > 0u);
-    cloud_span[index] = march_cell(index, known);
+    let within = select(EVERYWHERE, cloud_span[index], dispatch.spans > 0u);
+    cloud_span[index] = march_cell(index, within);
 }
 
-// The weight up to which a ray has met nothing: of decks without extinction (`LEAST` in frame.rs).
+// Weight up to which a ray counts as having met no cloud. A deck without extinction has a weight too: its share of the
+// extinction is `LEAST` in frame.rs instead of 0.
 const NOTHING = 1e-15;
 
 const EVERYWHERE = vec2f(0.0, 1e30);
 const NOWHERE = vec2f(1e30, 0.0);
 
-// Marches the ray of a cell of the sheet within a span, and returns the span of its clouds.
+// Marches the ray of a cell of the strip within a range of distances. Returns the range of distances with cloud.
 fn march_cell(index: u32, within: vec2f) -> vec2f {
     let cell = vec2u(index % dispatch.march_width, dispatch.strip_row + index / dispatch.march_width);
     let pixel = marched_pixel(cell);
@@ -61,11 +63,11 @@ fn march_cell(index: u32, within: vec2f) -> vec2f {
 struct Cloud {
     radiance: vec3f, // premultiplied
     transmittance: f32,
-    depth: f32, // m, -1 where there is none
-    span: vec2f, // from the first to the last cloud, m from the start of the march; without end behind an opaque one
+    depth: f32, // m, -1 if there is no cloud
+    span: vec2f, // from the first to the last cloud, m from the start of the march; unbounded behind opaque cloud
 }
 
-// Of several rays the mean, which share the steps and the light that one has.
+// Mean of the rays through a pixel. They share the view steps and light samples of a single ray.
 fn march_pixel(pixel: vec2u, view: vec3f, within: vec2f) -> Cloud {
     let limit = scene_distance(pixel);
     let offset = ray_offset(pixel);
@@ -74,7 +76,7 @@ fn march_pixel(pixel: vec2u, view: vec3f, within: vec2f) -> Cloud {
     if !SUBRAYS {
         return march_ray(view, turned, limit, offset, within, rays);
     }
-    // Low-discrepancy sequences (R2, golden ratio) from where blue noise has it.
+    // Low-discrepancy sequences (R2, golden ratio), shifted by blue noise.
     let shift = vec2f(offset, ray_offset(pixel + vec2u(29u, 13u)));
     var sum = Cloud(vec3f(0.0), 0.0, 0.0, NOWHERE);
     var opacity = 0.0;
@@ -82,11 +84,11 @@ fn march_pixel(pixel: vec2u, view: vec3f, within: vec2f) -> Cloud {
     loop {
         let place = ray_place(pixel, fract(shift + k * vec2f(0.7548776662, 0.5698402910)), rays);
         let direction = view_direction(place).xyz;
-        let known = select(EVERYWHERE, within, rays <= 1.0);
-        let cloud = march_ray(direction, turned, limit, fract(offset + 0.6180339887 * k), known, rays);
+        let ray_span = select(EVERYWHERE, within, rays <= 1.0);
+        let cloud = march_ray(direction, turned, limit, fract(offset + 0.6180339887 * k), ray_span, rays);
         let weight = depth_weight(cloud.transmittance, cloud.depth);
-        // Under a condition that differs by pixel: else lavapipe adds to those that are done what the others' next turn finds
-        // (docs/numerics.md).
+        // The condition differs between pixels. Without it, lavapipe adds to finished pixels the values of the other
+        // pixels' next iteration (docs/numerics.md).
         if k < rays {
             sum.radiance += cloud.radiance / rays;
             sum.transmittance += cloud.transmittance / rays;
@@ -100,57 +102,61 @@ fn march_pixel(pixel: vec2u, view: vec3f, within: vec2f) -> Cloud {
         }
     }
     sum.depth = select(-1.0, sum.depth / opacity, opacity > 0.0);
-    // Neighbours of several rays say nothing of where those meet cloud.
+    // With several rays per pixel, the ranges of neighbouring pixels carry no information about a ray.
     sum.span = select(EVERYWHERE, sum.span, rays <= 1.0);
     return sum;
 }
 
-// One blue-noise offset of up to a step for the whole ray: it turns bands into fine noise at no cost in error, where
-// an offset for each step would cost twenty times the error (docs/numerics.md).
+// Jitter: one blue-noise offset of up to a step for all steps of a ray. It turns banding into fine noise without
+// additional error. An offset for each step has twenty times the error (docs/numerics.md).
 fn ray_offset(pixel: vec2u) -> f32 {
     let rank = textureLoad(blue_noise, pixel % BLUE_SIZE, 0).r;
-    // The largest rank is 1 as a half float.
+    // As a half float, the largest rank is 1.
     return select(0.5, fract(rank), params.quality.jitter > 0u);
 }
 
-// The steps of a ray: `count` of them over `length` metres, growing with distance by `growth` per metre.
+// View steps of a ray: `count` steps over `length` metres. Steps grow by `growth` per metre of distance.
 struct Steps {
     count: u32,
     length: f32,
     growth: f32,
-    scale: f32, // log2 of the ratio of a step to the one before
-    ratio: f32, // of a step to its distance, where they grow, plus 1 / growth
-    equal: f32, // all of them, where they do not, m
+    scale: f32, // log2 of the ratio of consecutive steps
+    ratio: f32, // ratio of a step to its distance plus 1 / growth, for growing steps
+    equal: f32, // length of each step without growth, m
 }
 
-// How many times the steps a ray through two decks gets, within the twice that the longest get.
+// Factor on the number of view steps for rays through two decks. The product with the factor for long rays is at most
+// 2.
 const TWO_DECKS = 1.5;
 
-// Of several rays through a pixel each gets its share of them, but no less than that of what one alone gets: toward the limb from
-// 402 km, in a picture of 32x32, `draft` finds a cover of 0.563 with a tenth, 0.591 with a third and 0.596 with all.
+// Lower bound on the number of steps of each of several rays through a pixel, relative to a single ray. Toward the limb
+// from 402 km, in a picture of 32x32, `draft` has a cover of 0.563 with a tenth, 0.591 with a third and 0.596 with all
+// steps.
 const SHARED_STEPS = 0.5;
 
 fn ray_steps(start: f32, length: f32, direction: vec3f, rays: f32) -> Steps {
     let slant = 1.0 - abs(dot(direction, frame.view.zenith));
     let count = mix(f32(params.quality.steps_zenith), f32(params.quality.steps_horizon), slant);
-    // At full growth a step is a fixed share of its distance plus 300 m: rays that start in the cloud have fine steps
-    // near the eye (10 m, where 1 km would give 25 and show them as grain), rays that start far away nearly equal ones.
+    // At full growth a step is a fixed fraction of its distance plus 300 m. Rays that start in cloud have fine steps
+    // near the eye: 10 m; with 1 km in place of 300 m they have 25 m, which is visible as grain. Rays that start far
+    // away have nearly equal steps.
     var growth = params.quality.step_growth / (start + 300.0);
     growth = select(growth, 0.0, growth * length < 1e-3);
-    // A ray from inside the clouds, or from just above them, has to cover many more distances than one from the ground:
-    // it gets up to twice the steps, or its far clouds are grain.
+    // Rays from inside the clouds, or from just above them, cover a larger range of distances than rays from the
+    // ground. They have up to twice the steps; otherwise distant clouds are grainy.
     let reach = log(1.0 + growth * length);
-    // So does one through two decks: with as many steps as through one, those of `two_decks` err by a half more.
+    // Rays through two decks have more steps. With the steps of one deck, the error of `two_decks` is half as large
+    // again.
     let decks = select(1.0, mix(1.0, TWO_DECKS, frame.sky.upper_shown), UPPER && growth > 0.0);
     let whole = round(count * clamp(decks * sqrt(reach), 1.0, 2.0));
     let steps = max(round(whole * max(1.0 / rays, SHARED_STEPS)), 1.0);
     let each = reach / steps;
-    // exp(each) - 1 with all its digits.
+    // exp(each) - 1 without cancellation.
     let ratio = each * exp(each) * one_minus_exp_over(each);
     return Steps(u32(steps), length, growth, each / log(2.0), ratio, select(0.0, length / steps, growth == 0.0));
 }
 
-// Distance from the start of the march to a step boundary.
+// Distance from the start of the march to the start of step `i`, m.
 fn step_distance(steps: Steps, i: f32) -> f32 {
     if steps.growth == 0.0 {
         return steps.equal * i;
@@ -158,14 +164,14 @@ fn step_distance(steps: Steps, i: f32) -> f32 {
     return (exp2(steps.scale * i) - 1.0) / steps.growth;
 }
 
-// A place on the ray.
+// Sample on a ray.
 struct Sample {
     p: vec3f,
     t: f32,
     altitude: f32,
-    begin: f32, // of the step it stands for, m from the start of the march
-    length: f32, // of that step
-    width: f32, // a pixel across, or a good part of the step along the ray, whichever is more
+    begin: f32, // start of its step, m from the start of the march
+    length: f32, // length of its step, m
+    width: f32, // footprint, m: the larger of the pixel's width and a fraction of the step
 }
 
 fn march_sample(s: Segments, steps: Steps, direction: vec3f, offset: f32, i: u32, pixel_size: f32) -> Sample {
@@ -177,18 +183,18 @@ fn march_sample(s: Segments, steps: Steps, direction: vec3f, offset: f32, i: u32
     return Sample(p, t, altitude_at(p), begin, length, max(t * pixel_size, 0.3 * length));
 }
 
-// Samples in a row that are lit as one.
+// Light group: consecutive samples that share their light samples.
 struct Group {
-    weight: f32, // of all of them: what they take from the transmittance
+    weight: f32, // sum of the samples' weights: the decrease of the transmittance
     distance: f32, // mean by weight, m from the eye
     precipitation: f32, // mean by weight
-    above: f32, // share of the ambient light, mean by weight
-    width: f32, // of the last
-    opacity: f32, // of what is before the last
+    above: f32, // share of the ambient light from above, mean by weight
+    width: f32, // footprint of the last sample, m
+    opacity: f32, // opacity in front of the last sample
 }
 
-// Their place is where most of them is: a sample that outweighs all before it has its own, or a veil before a cloud would
-// move it into the gap between.
+// Adds a sample to a group. The group's distance is the mean by weight, or that of the sample if it outweighs all
+// before it: otherwise a veil in front of a cloud would move the group into the gap between them.
 fn with_sample(group: Group, weight: f32, opacity: f32, at: Sample, column: WeatherSample) -> Group {
     let here = vec3f(at.t, column.precipitation, ambient_share(column));
     let before = vec3f(group.distance, group.precipitation, group.above);
@@ -197,14 +203,15 @@ fn with_sample(group: Group, weight: f32, opacity: f32, at: Sample, column: Weat
     return Group(total, mean.x, mean.y, mean.z, at.width, opacity);
 }
 
-// Rain is so thin that a tenth of a pixel of it is kilometres long, in sun and shadow: it is lit by so much less at a time.
-// Measured in docs/clouds.md's `rain`: with 0.3 shafts have edges and clouds behind them dots, with 0.05 neither.
+// Factor on the light-group weight in rain. Rain is so thin that a tenth of a pixel's opacity extends over kilometres,
+// in sun and shadow. In `rain` of docs/clouds.md, shafts have visible edges and clouds behind them dots with 0.3; with
+// 0.05 neither.
 const RAIN_SHARE = 0.05;
 
-// Most groups that wait for their light: with the default share of light a ray has no more.
+// Maximum number of groups that wait for their light. With the default light-group weight no ray has more.
 const GROUPS = 12u;
 
-// At which step a distance is reached.
+// Index of the step at a distance.
 fn step_index(steps: Steps, distance: f32) -> f32 {
     if steps.growth == 0.0 {
         return distance / steps.length * f32(steps.count);
@@ -212,7 +219,7 @@ fn step_index(steps: Steps, distance: f32) -> f32 {
     return log2(1.0 + steps.growth * distance) / steps.scale;
 }
 
-// How many steps take a way, the first of them of a given length.
+// Number of steps over a distance, if the first of them has the given length.
 fn steps_over(steps: Steps, way: f32, length: f32) -> f32 {
     if steps.growth == 0.0 {
         return way / length;
@@ -220,14 +227,14 @@ fn steps_over(steps: Steps, way: f32, length: f32) -> f32 {
     return log2(1.0 + way / length * steps.ratio) / steps.scale;
 }
 
-// How far a ray may leap through clear air for each unit that the base shape lacks of being cloud.
+// Sphere-tracing factor for steps through clear air.
 struct Leaps {
-    reach: f32, // m
-    rise: f32, // by how much less along the ray, as its heights pass through the profile
+    reach: f32, // step per unit by which the base shape falls short of cloud, m
+    rise: f32, // divisor of `reach` along the ray, due to the change of the height profile
 }
 
-// The profile of heights, from base to top, rises and falls within an eighth of them. Measured: a fourth leaps past stratus
-// in `above`; a sixteenth takes as many samples as an eighth.
+// Slope of the height profile, per thickness of the clouds: it rises and falls within an eighth of the thickness.
+// Measured: with a slope of 4, steps skip stratus in `above`; 16 takes as many samples as 8.
 const PROFILE_SLOPE = 8.0;
 
 fn ray_leaps(direction: vec3f, medium: u32) -> Leaps {
@@ -240,16 +247,17 @@ fn ray_leaps(direction: vec3f, medium: u32) -> Leaps {
     return Leaps(reach, 1.0 + PROFILE_SLOPE * abs(dot(direction, frame.view.zenith)) * reach / thickness);
 }
 
-// The steps from a point without cloud to where to look next: `big_step` of them, or more the more the shape lacks, as the
-// noise changes no faster than so much in a metre (Hart 1996, "sphere tracing", with a slope that is measured, not a bound).
-// Its threshold is what the profile lets through, here and, with none, at any height. Not to where another medium may be.
+// Number of view steps from a point without cloud to the next sample. It is at least `big_step`, and grows with the
+// amount by which the base shape falls short of cloud, as the slope of the noise is limited (Hart 1996, "sphere
+// tracing"; the slope used here is measured, not a bound). The threshold of cloud is evaluated for the profile at the
+// point, and for a profile of 1, which holds at any height. Longer steps never enter another medium.
 fn steps_to_next(steps: Steps, direction: vec3f, column: WeatherSample, noise: f32, at: Sample) -> u32 {
     let big = f32(params.quality.big_step);
     if VOLUME {
         return params.quality.big_step;
     }
     let leaps = ray_leaps(direction, column.medium);
-    // By the chart, on which noise and cover change as fast everywhere.
+    // Distances on the chart: noise and coverage have the same slope everywhere on it.
     let lacks = 1.0 - column.coverage - noise * vec2f(1.0, column.profile);
     var way = leaps.reach * max(lacks.x, lacks.y / leaps.rise);
     if KEEP_CLEAR {
@@ -265,24 +273,25 @@ fn steps_to_next(steps: Steps, direction: vec3f, column: WeatherSample, noise: f
     return u32(clamp(steps_over(steps, way, at.length), big, 1.0 + LONGEST_LEAP * (big - 1.0)));
 }
 
-// Rays bend away from the ground: by less than this within a leap.
+// Upper bound of the change of a ray's zenith cosine within a step through clear air, due to the planet's curvature.
 const BEND_OF_LEAP = 1e-3;
 
-// No leap goes into the rain, nor any in it.
+// Distance to the rain, m; 0 inside it. Steps longer than a coarse step neither enter rain nor occur in it.
 fn way_to_rain(direction: vec3f, at: Sample) -> f32 {
     let mu = cos_zenith_along(direction, at.t, at.altitude);
     let over = max(at.altitude - params.clouds.base, 0.0);
     return select(over / (abs(mu) + BEND_OF_LEAP), 1e30, mu > 0.0 && over > 0.0);
 }
 
-// Where a spot is kept clear there is no more than without it, and leaps from outside hold; within it, to where the cover
-// begins, and in its rim none.
+// Limit of a step at the region kept clear, m. Outside its rim there is none, as the region only removes clouds. Inside
+// it steps end where coverage begins. In the rim the limit is 0.
 fn way_to_rim(at: Sample) -> f32 {
     let away = length(on_chart(at.p, at.altitude) - frame.sky.clear_at);
     return select(max(frame.sky.clear_radius - away, 0.0), 1e30, away >= 1.5 * frame.sky.clear_radius);
 }
 
-// A leap within a deck, no farther than to the other one; between both, all the way there.
+// Length of a step with two decks, m. Within a deck it ends at the other deck at the latest. Between the decks it is
+// the whole way to the next one.
 fn way_to_decks(direction: vec3f, leap: f32, at: Sample) -> f32 {
     let over = at.altitude - frame.sky.lower_top;
     let under = params.upper_clouds.base - at.altitude;
@@ -291,19 +300,21 @@ fn way_to_decks(direction: vec3f, leap: f32, at: Sample) -> f32 {
     if over > 0.0 && under > 0.0 {
         return way;
     }
-    // Towers may reach into the deck above: there neither is alone, as soon as that shows.
+    // Where towers reach into the upper deck, both decks overlap. Steps there shrink to coarse steps as the upper deck
+    // appears.
     let alone = leap * select(1.0, 1.0 - frame.sky.upper_shown, over <= 0.0 && under <= 0.0);
     return select(alone, min(alone, way), way > 0.0);
 }
 
-// Steps for each that a big step leaps over: where those leap over none, nothing does.
+// Maximum length of a step through clear air, as a multiple of the view steps that a coarse step skips. A coarse step
+// of 1 skips none, and disables longer steps.
 const LONGEST_LEAP = 16.0;
 
 fn march_ray(direction: vec3f, turned: Turn, limit: f32, offset: f32, within: vec2f, rays: f32) -> Cloud {
     let segments = segments_before(cloud_segments(direction), limit);
     let length = segments.first + segments.second;
-    // The optical depth is summed, not the transmittance multiplied: a thousand factors of almost 1 are all 1, or all
-    // 6e-8 less.
+    // The optical depth is summed. A product of a thousand transmittances of almost 1 is 1, or loses 6e-8 per factor
+    // (docs/numerics.md).
     var optical_depth = 0.0;
     var transmittance = 1.0;
     if length <= 0.0 || (!VOLUME && !UPPER && params.clouds.coverage <= 0.0) {
@@ -317,14 +328,16 @@ fn march_ray(direction: vec3f, turned: Turn, limit: f32, offset: f32, within: ve
     var sum = Gathered();
 
     let big = params.quality.big_step;
-    // Measured on `fair_weather`: one big step of slack errs by 6 %, 4 by 2 %, 8 as little as all of the ray, in 3 % more time.
+    // Error on `fair_weather`: 6 % with a slack of one coarse step, 2 % with 4, and with 8 no more than for a march of
+    // the whole ray. 8 take 3 % more time.
     let slack = f32(8u * big);
     let end = u32(clamp(step_index(steps, within.y) + slack, 0.0, f32(steps.count)));
-    var i = u32(clamp(step_index(steps, within.x) - slack, 0.0, f32(steps.count))); // the step at hand
+    var i = u32(clamp(step_index(steps, within.x) - slack, 0.0, f32(steps.count))); // index of the current step
     var span = NOWHERE;
-    var seen = i; // steps below this one have had their full sample
-    var leapt = big; // steps before this one that have been leapt over, and one
-    // The way to the first cloud has a loop of its own, without what is for clouds: that is a third of a turn.
+    var seen = i; // steps below this index have been sampled in full
+    var leapt = big; // length of the last step in view steps; all but one of them were skipped
+    // The search for the first cloud has a loop of its own, without the code for clouds, which is a third of an
+    // iteration.
     loop {
         let at = march_sample(segments, steps, direction, offset, i, pixel_size);
         let column = cloud_column(at.p, at.altitude);
@@ -342,23 +355,24 @@ fn march_ray(direction: vec3f, turned: Turn, limit: f32, offset: f32, within: ve
     if i >= end {
         return Cloud(vec3f(0.0), 1.0, -1.0, NOWHERE);
     }
-    var empty = 0u; // full samples of zero in a row; from so many on, samples are cheap
-    var reached = 0.0; // distance by weight, m
+    var empty = 0u; // consecutive full samples of zero density; from `empty_samples` on, the march takes coarse steps
+    var reached = 0.0; // sum of distances by weight, m
     var group = Group();
     var groups: array<Group, GROUPS>;
     var count = 0u;
-    // First the ray, then the light: lavapipe runs both sides of every branch, and eight rays together. Each goes on through
-    // gaps and clouds of its own, and none waits for another's light. Measured at 1280x720, night included: 35 samples a ray of
-    // `fair_weather` in `draft` take 45 turns, and light 3; where light was looked for at each sample, 86 and 16.
+    // The ray is marched first and lit after: lavapipe runs both sides of every branch for eight rays together. Each
+    // ray continues through its own gaps and clouds and waits for no other ray's light. Measured at 1280x720, night
+    // included: 35 samples per ray of `fair_weather` in `draft` take 45 iterations of the march and 3 of the light;
+    // with light at each sample, 86 and 16.
     loop {
         loop {
             let at = march_sample(segments, steps, direction, offset, i, pixel_size);
             let column = cloud_column(at.p, at.altitude);
             let noise = base_noise(column);
             let shape = shape_in(column, noise);
-            // Leaps outside clouds; on a hit back by what was leapt over.
+            // Outside clouds samples are coarse. On a hit the march goes back over the skipped steps.
             let searching = empty >= params.quality.empty_samples;
-            let hit = !(shape <= 0.0); // not "shape > 0": with that, a NaN would stand still for ever
+            let hit = !(shape <= 0.0); // not "shape > 0", with which a NaN would never advance
             let back = select(i, max(i - min(i, leapt - 1u), seen), searching);
             let full = hit && back == i;
             var density = 0.0;
@@ -405,7 +419,7 @@ fn march_ray(direction: vec3f, turned: Turn, limit: f32, offset: f32, within: ve
                 }
             }
         }
-        // Tested at their end, loops run once less on lavapipe: a fifth of the time.
+        // Loops that test at their end run one iteration less on lavapipe: a fifth of the time.
         if i >= end {
             break;
         }
@@ -417,7 +431,7 @@ fn march_ray(direction: vec3f, turned: Turn, limit: f32, offset: f32, within: ve
 
     var scale = 1.0;
     if transmittance < params.quality.min_transmittance {
-        // What the rest of the ray would have added is taken to be like what was seen.
+        // The rest of the ray is assumed to have the mean radiance of the marched part.
         scale = 1.0 / (1.0 - transmittance);
         transmittance = 0.0;
         span.y = EVERYWHERE.y;

@@ -1,18 +1,18 @@
-// Bakes the light that the air and the ground have scattered, order by order. The first keeps its phase functions; of
-// those after it the mean and two moments are kept, which depend on altitude and sun alone, so that each is gathered from
-// the tables of the one before. Hillaire 2020 takes the second to stand for all that follow, which at dusk, when low air is lit
-// by high air alone, it does not.
+// Bakes the multiscattering LUT, order by order. The first order keeps its phase functions. Higher orders are kept as
+// mean and two moments, which are functions of altitude and sun alone, so that each order is gathered from the tables
+// of the one before. Hillaire 2020 extrapolates the higher orders from the second as a geometric series, which fails at
+// dusk, when low air is lit by high air alone.
 #import bindings
 #import atmosphere
 
-// Directions that a point gathers light from: rows above and below its horizon, columns from the sun's azimuth to the
-// other side; and steps along each.
+// Directions of the gather: rows above and below the horizon, columns from the sun's azimuth to the opposite one. Steps
+// along each direction.
 const ROWS_ABOVE = 8u;
 const ROWS_BELOW = 4u;
 const COLUMNS = 6u;
 const STEPS = 10u;
 
-// What arrives at a point: as the tables.
+// Light that arrives at a point, in the form of the tables.
 struct Arriving {
     mean: vec3f,
     up: vec3f,
@@ -57,7 +57,7 @@ fn gather_light(h: f32, mu_sun: f32, first: bool) -> Arriving {
     var sum = Arriving(vec3f(0.0), vec3f(0.0), vec3f(0.0), vec3f(0.0), vec3f(0.0), vec3f(0.0));
     var cosines = vec2f(0.0);
     for (var row = 0u; row < ROWS_ABOVE + ROWS_BELOW; row++) {
-        // By squares from the horizon, where light changes fastest with the angle.
+        // Quadratic spacing of elevation angles around the horizon, where light changes fastest with the angle.
         let is_above = row < ROWS_ABOVE;
         let rows = f32(select(ROWS_BELOW, ROWS_ABOVE, is_above));
         let x = vec3f(0.0, 0.5, 1.0) / rows + f32(select(row - ROWS_ABOVE, row, is_above)) / rows;
@@ -66,7 +66,11 @@ fn gather_light(h: f32, mu_sun: f32, first: bool) -> Arriving {
         let up = sin(angle.y);
         for (var column = 0u; column < COLUMNS; column++) {
             let azimuth = PI * (f32(column) + 0.5) / f32(COLUMNS);
-            let cosine = clamp(up * mu_sun + cos(angle.y) * cos(azimuth) * sqrt(max(1.0 - mu_sun * mu_sun, 0.0)), -1.0, 1.0);
+            let cosine = clamp(
+                up * mu_sun + cos(angle.y) * cos(azimuth) * sqrt(max(1.0 - mu_sun * mu_sun, 0.0)),
+                -1.0,
+                1.0,
+            );
             let light = light_along(h, mu_sun, up, cosine, is_above, first);
             let sunward = cos(angle.y) * cos(azimuth);
             sum.mean += share * light;
@@ -83,7 +87,8 @@ fn gather_light(h: f32, mu_sun: f32, first: bool) -> Arriving {
     return sum;
 }
 
-// Radiance of one order that arrives at a point from a direction with zenith cosine `mu` and cosine `cosine` with the sun.
+// Radiance of one order that arrives at a point from a direction with zenith cosine `mu` and cosine `cosine` to the
+// sun.
 fn light_along(h: f32, mu_sun: f32, mu: f32, cosine: f32, is_above: bool, first: bool) -> vec3f {
     let radius = params.atmosphere.planet_radius;
     let r = radius + h;
@@ -93,7 +98,7 @@ fn light_along(h: f32, mu_sun: f32, mu: f32, cosine: f32, is_above: bool, first:
     let ground = h * (2.0 * radius + h);
     let to_ground = ground / max(sqrt(max(b * b - ground, 0.0)) - b, 1e-3);
     let end = select(to_ground, to_top, is_above);
-    // By squares from the lowest point.
+    // Quadratic spacing from the lowest point of the ray.
     let lowest = clamp(-b, 0.0, end);
     let from_s = -sqrt(lowest);
     let to_s = sqrt(end - lowest);
@@ -141,7 +146,7 @@ fn order_before(table: u32, h: f32, mu: f32) -> vec3f {
     return from_table(textureSampleLevel(mix_a, clamp_sampler, table_coordinates(table, h, mu), 0.0).rgb);
 }
 
-// The sum of four orders and of those that follow, each the share of the one before that the fourth is of the third.
+// Sum of all orders: four of them, and a geometric series with the ratio of the fourth to the third.
 @compute @workgroup_size(8, 8)
 fn sum_orders(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= textureDimensions(map_out)) {
@@ -150,6 +155,7 @@ fn sum_orders(@builtin(global_invocation_id) id: vec3u) {
     let third = from_table(textureLoad(mix_c, id.xy, 0).rgb);
     let fourth = from_table(textureLoad(mix_d, id.xy, 0).rgb);
     let rest = fourth / (1.0 - min(fourth / max(third, vec3f(TABLE_NONE)), vec3f(0.95)));
-    let sum = from_table(textureLoad(mix_a, id.xy, 0).rgb) + from_table(textureLoad(mix_b, id.xy, 0).rgb) + third + rest;
+    let sum = from_table(textureLoad(mix_a, id.xy, 0).rgb) + from_table(textureLoad(mix_b, id.xy, 0).rgb)
+        + third + rest;
     textureStore(map_out, id.xy, vec4f(to_table(sum), 1.0));
 }

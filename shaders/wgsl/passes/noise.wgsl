@@ -1,8 +1,8 @@
-// Bakes the three noise textures (nubis2015, "noise"): base shape, detail, curl. All tile.
+// Bakes the three tileable noise textures (nubis2015, "noise"): base shape, detail, curl.
 #import bindings
 #import gradient_noise
 
-// Different lattices for different octaves and textures.
+// Salts that give octaves and textures different lattices.
 const PERLIN_SALT = 1u;
 const WORLEY_SALT = 31u;
 const DETAIL_SALT = 61u;
@@ -12,14 +12,16 @@ fn tile_point(id: vec3u, size: vec3u) -> vec3f {
     return (vec3f(id) + 0.5) / vec3f(size);
 }
 
-// A Worley FBM keeps to the middle of its range (nine in ten values from 0.28 to 0.68); spread over all of it, it shapes.
+// Contrast stretch of a Worley FBM. Nine in ten of its values lie between 0.28 and 0.68; only the full range carves
+// shapes.
 fn stretched(worley: f32) -> f32 {
     return remap01(worley, 0.2, 0.75);
 }
 
-// 128^3, the base shape of four noises: R Perlin-Worley; G, B, A Worley FBMs of rising frequency, dark at the feature points,
-// as the sampler's remap(R, -(1 - fbm(GBA)), 1, 0, 1) wants them. The five Worley octaves are computed once and shared.
-// vsu2022: Perlin-Worley of rising frequency in all four, G, B, A in the same sense.
+// Base shape, 128^3, of four noises. R is Perlin-Worley noise; G, B and A are Worley FBMs of rising frequency, dark at
+// the feature points, as the sampler's remap(R, -(1 - fbm(GBA)), 1, 0, 1) requires. The five Worley octaves are
+// computed once and shared. In vsu2022 all four are Perlin-Worley noise of rising frequency, with G, B and A in the
+// same sense.
 @compute @workgroup_size(4, 4, 4)
 fn shape(@builtin(global_invocation_id) id: vec3u) {
     let size = textureDimensions(volume_out);
@@ -28,7 +30,7 @@ fn shape(@builtin(global_invocation_id) id: vec3u) {
     }
     let p = tile_point(id, size);
     let seed = params.clouds.seed * 131u;
-    var w: array<f32, 5>; // 3, 6, 12, 24, 48 cells a tile
+    var w: array<f32, 5>; // 3, 6, 12, 24, 48 cells per tile
     for (var i = 0u; i < 5u; i++) {
         w[i] = worley(p, 3u << i, seed + WORLEY_SALT + i);
     }
@@ -45,7 +47,7 @@ fn shape(@builtin(global_invocation_id) id: vec3u) {
     textureStore(volume_out, id, vec4f(base_shape(texel)));
 }
 
-// 32^3, the sum of three noises: Worley FBMs of rising frequency in R, G, B; Perlin-Worley in all of them for vsu2022.
+// Detail, 32^3: an FBM of three Worley FBMs of rising frequency; of Perlin-Worley noises in vsu2022.
 @compute @workgroup_size(4, 4, 4)
 fn detail(@builtin(global_invocation_id) id: vec3u) {
     let size = textureDimensions(volume_out);
@@ -54,7 +56,7 @@ fn detail(@builtin(global_invocation_id) id: vec3u) {
     }
     let p = tile_point(id, size);
     let seed = params.clouds.seed * 131u + DETAIL_SALT;
-    var w: array<f32, 4>; // 2, 4, 8, 16 cells a tile
+    var w: array<f32, 4>; // 2, 4, 8, 16 cells per tile
     for (var i = 0u; i < 4u; i++) {
         w[i] = worley(p, 2u << i, seed + i);
     }
@@ -71,8 +73,8 @@ fn detail(@builtin(global_invocation_id) id: vec3u) {
     textureStore(volume_out, id, vec4f(fbm3(texel)));
 }
 
-// 160^3, the detail and the same again, smaller. Its texels are those of the smaller one, and the middle of every fifth is that
-// of a texel of the detail: between them both lie on the same straight lines as where they are read alone.
+// Detail and its finer copy, 160^3. Texels have the size of the finer copy's, and every fifth centre is that of a texel
+// of the detail. Linear interpolation between the texels therefore equals that of the two textures on their own.
 @compute @workgroup_size(4, 4, 4)
 fn finer_detail(@builtin(global_invocation_id) id: vec3u) {
     let size = textureDimensions(volume_out);
@@ -81,7 +83,7 @@ fn finer_detail(@builtin(global_invocation_id) id: vec3u) {
     }
     let p = tile_point(id, size);
     let detail = textureSampleLevel(volume_in, repeat_sampler, p, 0.0).r;
-    // Its axes are others, so that the two show no pattern together. Its mean is 0.5.
+    // Permuted axes avoid a common pattern of the two. The copy's mean is 0.5.
     let fine = textureSampleLevel(volume_in, repeat_sampler, f32(FINER) * p.zxy, 0.0).r;
     textureStore(volume_out, id, vec4f(saturate(detail + params.clouds.fine_detail * (fine - 0.5))));
 }
@@ -90,7 +92,8 @@ fn curl_potential(p: vec2f, seed: u32) -> f32 {
     return perlin_fbm(vec3f(p, 0.5), 4u, 3u, seed);
 }
 
-// 128^2: the curl of a potential, which has no divergence: it swirls and never gathers (Bridson 2007). About -1 to 1.
+// Curl of a potential, 128^2: a divergence-free vector field, which swirls and never gathers (Bridson 2007), in about
+// [-1, 1].
 @compute @workgroup_size(8, 8)
 fn curl(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= vec2u(CURL_SIZE)) {
@@ -101,11 +104,11 @@ fn curl(@builtin(global_invocation_id) id: vec3u) {
     const e = 0.5 / f32(CURL_SIZE);
     let dx = curl_potential(p + vec2f(e, 0.0), seed) - curl_potential(p - vec2f(e, 0.0), seed);
     let dy = curl_potential(p + vec2f(0.0, e), seed) - curl_potential(p - vec2f(0.0, e), seed);
-    // A slope of 5 a tile is about the largest that three octaves from 4 cells up reach.
+    // Normalisation: a slope of 5 per tile is about the largest of three octaves from 4 cells up.
     texels_out[id.y * CURL_SIZE + id.x] = pack2x16float(vec2f(dy, -dx) / (2.0 * e) / 5.0);
 }
 
-// A volume as half floats of one channel, two in each word.
+// Packs a volume as half floats of one channel, two per word.
 @compute @workgroup_size(64)
 fn pack(@builtin(global_invocation_id) id: vec3u) {
     let size = textureDimensions(volume_in);
@@ -117,7 +120,7 @@ fn pack(@builtin(global_invocation_id) id: vec3u) {
     texels_out[(id.z * size.y + id.y) * packed_row(size.x) + id.x] = pack2x16float(pair);
 }
 
-// Half the size, each texel the mean of eight: wgpu makes no mips of volumes.
+// Mip of half the size, by a box filter: wgpu makes no mips of volumes.
 @compute @workgroup_size(4, 4, 4)
 fn downsample(@builtin(global_invocation_id) id: vec3u) {
     if any(id >= textureDimensions(volume_out)) {

@@ -1,8 +1,8 @@
-// Traces paths of light from each pixel through every order of scattering: delta tracking from collision to collision,
-// ratio tracking toward the sun from each (Novák et al. 2018), sky and ground for the light around.
+// Path tracer: every order of scattering, from each pixel. Collisions are found by delta tracking, transmittance toward
+// the sun by ratio tracking (Novák et al. 2018), and the environment is sky and ground.
 //
-// One loop whose every turn is one step of one flight: no path waits for another, and a pixel can stop after any turn and
-// go on in the next dispatch.
+// One loop, whose every iteration is one step of one flight. No path waits for another, and a pixel can stop after any
+// iteration and continue in the next dispatch.
 #import bindings
 #import camera
 #import majorant
@@ -13,19 +13,19 @@
 #import subrays
 
 // Stages of a pixel.
-const START = 0u; // of a path
-const FLIGHT = 1u; // of light, backward, to its next collision
-const SHADOW = 2u; // toward the sun, from a collision
-const GROUND = 3u; // toward the sun, from the ground
+const START = 0u; // start of a path
+const FLIGHT = 1u; // flight against the direction of the light, to the next collision
+const SHADOW = 2u; // shadow ray toward the sun, from a collision
+const GROUND = 3u; // shadow ray toward the sun, from the ground
 const DONE = 4u;
 
-// The shortest step, m: more than positions are rounded by, so that a flight ends whatever the extinction. In the densest
-// cloud light goes several metres freely; of an extinction of 1 / m it makes 5e-5 less.
+// Shortest step, m: longer than the rounding of positions, so that a flight ends at any extinction. The mean free path
+// in the densest cloud is several metres. An extinction of 1 / m is reduced by 5e-5.
 const SHORTEST = 1e-2;
-// A path of so many turns ends where it is. None does where light can go a metre; where it cannot (extinction up to
-// 1e8 / m) or where clouds are a metre thick, paths must end too.
+// Largest number of iterations of a path, at which it ends. No path reaches it where the mean free path is a metre.
+// Paths must also end where it is shorter (extinction up to 1e8 / m) or where clouds are a metre thick.
 const MOST_TURNS = 1u << 20u;
-// Below it a path goes on by chance alone, with the weight of those that end (Russian roulette).
+// Russian-roulette threshold: paths with less throughput end at random, and survivors take over their weight.
 const ROULETTE_THRESHOLD = 0.1;
 
 @compute @workgroup_size(64)
@@ -64,7 +64,7 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
         }
         let u = draw(&ray, pixel);
 
-        // A step: to a collision that is real or not, or as far as the majorant holds.
+        // One step: to a real or null collision, or as far as the majorant holds.
         let s = Segments(ray.flight.x, ray.flight.y, ray.flight.z, ray.flight.w);
         let length = s.first + s.second;
         let direction = select(frame.sky.sun_direction, ray.direction, ray.stage == FLIGHT);
@@ -73,10 +73,10 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
         let free = max(-log(1.0 - u.x) / max(majorant.density * frame.sky.extinction, 1e-30), SHORTEST);
         let before_gap = ray.x < s.first && s.second > 0.0;
         let room = select(length, s.first, before_gap) - ray.x;
-        // Never without progress, whatever is rounded.
+        // Every step makes progress, despite rounding.
         let reach = max(majorant.reach, 4e-7 * (s.start + ray.x) + SHORTEST);
         let collides = free < min(reach, room);
-        // The end is reached exactly, and the gap left behind.
+        // The end of the segments is reached exactly; the step over the gap ends behind it for certain.
         let edge = select(length, s.first + SHORTEST + 4e-7 * s.first, before_gap);
         ray.x = select(select(edge, ray.x + reach, reach < room), ray.x + free, collides);
         let t = stretch_distance(s, ray.x);
@@ -96,7 +96,7 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
                 ray.throughput *= params.light.albedo;
                 ray.distance += select(0.0, t, ray.scatterings == 1u);
                 if AIR && ray.scatterings == 1u {
-                    // The rest of the path is seen through the air.
+                    // The eye sees the first collision, and with it the rest of the path, through the air.
                     let way = air_segment(direction);
                     let air = air_before(direction, t, way, air_texels(direction), sky_radiance(direction));
                     ray.throughput *= air.transmittance;
@@ -139,7 +139,7 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
     progress[id.x] = vec2u(turns, select(0u, 1u, ray.stage == DONE));
 }
 
-// Three random numbers in [0, 1), never the same for two pixels, paths or turns.
+// Three random numbers in [0, 1), distinct for every pixel, path and iteration.
 fn draw(ray: ptr<function, PathRay>, pixel: vec2u) -> vec3f {
     (*ray).random_dimension += 1u;
     let number = pixel.y * frame.view.width + pixel.x;
@@ -159,7 +159,7 @@ fn view_flight(view: vec4f, limit: f32) -> vec4f {
     return select(vec4f(s.start, s.first, s.gap, s.second), vec4f(0.0), clear);
 }
 
-// The segments of a flight that starts at a point, to the ground at most.
+// Segments of a flight from a point, up to the ground.
 fn flight_from(p: vec3f, direction: vec3f) -> vec4f {
     let ground = hit_ground_from(p, direction);
     var s = cloud_stretches_from(p, direction);
@@ -171,7 +171,7 @@ fn flight_from(p: vec3f, direction: vec3f) -> vec4f {
     return vec4f(s.start, s.first, s.gap, s.second);
 }
 
-// On from a collision, or from the ground.
+// Continuation of a path from a collision or from the ground.
 fn scattered_on(given: PathRay, pixel: vec2u) -> PathRay {
     var ray = given;
     let u = draw(&ray, pixel);
@@ -183,7 +183,7 @@ fn scattered_on(given: PathRay, pixel: vec2u) -> PathRay {
         ray.throughput *= ROULETTE_THRESHOLD / brightest;
     }
     if ray.stage == GROUND {
-        // By Lambert's law about the local zenith.
+        // Cosine-weighted sampling about the local zenith (Lambertian ground).
         let up = normalize(frame.view.zenith * frame.view.centre_distance + ray.origin);
         let side = perpendicular(up);
         let angle = 2.0 * PI * u.y - PI;
@@ -202,7 +202,7 @@ fn scattered_on(given: PathRay, pixel: vec2u) -> PathRay {
     return ray;
 }
 
-// Out of the clouds: to the eye's background if it met none, else to the sky or to the ground.
+// Escape from the clouds: without a collision, to the background of the eye, else to the sky or to the ground.
 fn escaped(given: PathRay, pixel: vec2u) -> PathRay {
     var ray = given;
     if ray.scatterings == 0u {
@@ -233,7 +233,7 @@ fn escaped(given: PathRay, pixel: vec2u) -> PathRay {
 
 fn path_ended(given: PathRay) -> PathRay {
     var ray = given;
-    // What met no cloud, cut or not, saw the eye's background.
+    // Paths without a collision, truncated or not, see the background of the eye.
     ray.seen += select(0.0, 1.0, ray.scatterings == 0u);
     ray.radiance += ray.light;
     ray.squares += ray.light * ray.light;

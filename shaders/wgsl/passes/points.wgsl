@@ -1,11 +1,11 @@
-// Answers questions at points: the extinction there, and how much direct sun arrives through the clouds.
+// Queries at points: extinction, and transmittance toward the sun; optical depth along directions.
 #import bindings
 #import shell
 #import density
 #import panels
 #import ground_shadow
 
-// Extinction in 1/m, the field that `march` marches.
+// Extinction, 1/m, of the field that `march` integrates.
 @compute @workgroup_size(64)
 fn extinction_at_points(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= dispatch.columns {
@@ -16,7 +16,7 @@ fn extinction_at_points(@builtin(global_invocation_id) id: vec3u) {
     results[id.x] = vec4f(cloud_density_at(p, altitude, 0.0) * frame.sky.extinction, 0.0, 0.0, 0.0);
 }
 
-// So that lavapipe's limit of 65,535 iterations over a shader is never met (hazard 21).
+// Largest number of panels: it keeps a shader below lavapipe's limit of 65,535 loop iterations (docs/numerics.md).
 const MAX_SUN_PANELS = 16384u;
 
 @compute @workgroup_size(64)
@@ -43,11 +43,11 @@ fn depth_along_directions(@builtin(global_invocation_id) id: vec3u) {
     results[id.x] = vec4f(select(depth_from(vec3f(0.0), direction), -1.0, hidden), 0.0, 0.0, 0.0);
 }
 
-// Optical depth of all clouds on a ray from a point.
+// Optical depth of all clouds along a ray from a point.
 fn depth_from(p: vec3f, direction: vec3f) -> f32 {
     let s = cloud_stretches_from(p, direction);
     let length = s.first + s.second;
-    // At least so long that they suffice.
+    // Longer panels where `MAX_SUN_PANELS` of the finest would not cover the ray.
     let longest = max(2.0 * finest_feature(), length / f32(MAX_SUN_PANELS));
     var depth = 0.0;
     var x = 0.0;

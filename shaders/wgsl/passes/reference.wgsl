@@ -1,8 +1,8 @@
-// Integrates each pixel's ray until it has converged: the same field and light as `march`, panels halved until that
-// changes nothing, sun rays to the end of the clouds (docs/accuracy.md).
+// Reference integrator: integrates the field and light of `march` until each pixel's ray has converged. Panels are
+// halved until the result is stable; sun rays reach to the end of the clouds (docs/accuracy.md).
 //
-// One loop whose every turn reads one panel, of the view ray or of a sun ray: no ray waits for another, and a ray can
-// stop after any turn and go on in the next dispatch.
+// One loop, whose every iteration reads one panel, of the view ray or of a sun ray. No ray waits for another, and a ray
+// can stop after any iteration and continue in the next dispatch.
 #import bindings
 #import camera
 #import panels
@@ -11,25 +11,25 @@
 
 // Stages of a ray.
 const START = 0u;
-const VIEW = 1u; // reads a panel of the view ray
-const SUN = 2u; // reads a panel toward the sun, from one of the two points of the view panel
+const VIEW = 1u; // panel of the view ray
+const SUN = 2u; // panel of a sun ray, from one of the two points of the view panel
 const DONE = 3u;
 
-// Largest optical depth of a view panel before any halving.
+// Largest optical depth of a view panel at level 0, before any halving.
 const THICKEST = 0.5;
-// Largest difference of the optical depths toward the sun from the two points of a panel, before any halving: behind a
-// steep edge the light may come and go within one.
+// Largest difference, at level 0, of the optical depths toward the sun from the two points of a panel: behind a steep
+// edge light varies within a panel.
 const UNEVEN = 0.5;
-// Where a ray ends: behind it even light of full strength does not matter.
+// Optical depth at which a ray ends: fully lit cloud behind it is negligible.
 const OPAQUE = 18.0;
-// A ray is cut into no more panels than that before any halving, whatever the size of its features: long rays through
-// small ones still end.
+// Largest numbers of panels per ray at level 0, whatever the size of features: long rays through small features end,
+// too.
 const VIEW_PANELS = 4096.0;
 const SUN_PANELS = 1024.0;
-// After so many halvings, or evaluations, a ray counts as converged; `uncertainty` tells.
+// Limits of halvings and evaluations, at which a ray counts as converged; `uncertainty` has its error.
 const MOST_HALVINGS = 5u;
 const MOST_EVALUATIONS = 1u << 24u;
-// Radiance, as a share of the sun's irradiance, below which errors do not matter.
+// Radiance, as a fraction of the sun's irradiance, below which errors are negligible.
 const DARK = 1e-6;
 
 @compute @workgroup_size(64)
@@ -66,7 +66,7 @@ fn reference(@builtin(global_invocation_id) id: vec3u) {
             ray.stage = VIEW;
         }
 
-        // The panel at hand, on either ray.
+        // Current panel, of either ray.
         let toward_sun = ray.stage == SUN;
         let view_panel = Panel(ray.x, ray.end);
         let from_point = panel_points(view_panel)[ray.point];
@@ -83,17 +83,18 @@ fn reference(@builtin(global_invocation_id) id: vec3u) {
         let fair = (x + left) / select(VIEW_PANELS, SUN_PANELS, toward_sun);
         var longest = finer * max(clamp(width, 2.0 * finest_feature(), coarsest_panel()), fair);
         if VOLUME {
-            // Cells end the panels toward the sun; those of the view are halved, as their light is no cubic.
+            // Sun panels end at the grid's cells. View panels are also halved, as light along the view ray is no cubic.
             longest = select(finer * frame.sky.voxel, 1e30, toward_sun);
         }
-        // Sun rays are halved once: past that pictures change by less than 0.12 % and take five to ten times as long.
+        // Sun panels are halved once. Further halvings change pictures by less than 0.12 % and take five to ten times
+        // as long.
         longest = select(min(longest, ray.longest), longest * max(1.0, 0.5 / finer), toward_sun);
         let panel = panel_from(origin, along, s, x, min(longest, left));
         let reading = read_panel(panel, origin, along, s, width);
         let depth = panel_depth(panel, reading.density);
 
-        var add = false; // whether the view panel is ready to be added up
-        var next_sun = false; // whether a sun ray begins
+        var add = false; // whether the view panel is complete
+        var next_sun = false; // whether a sun ray starts
         if toward_sun {
             ray.sun_depth += depth;
             ray.sun_x = panel.end;
@@ -175,7 +176,7 @@ fn reference(@builtin(global_invocation_id) id: vec3u) {
     progress[id.x] = vec2u(turns, select(0u, 1u, ray.stage == DONE));
 }
 
-// A ray that has come to its end: done, or from the start again with panels half as long.
+// End of a ray: it has converged, or restarts with panels half as long.
 fn finished(given: ReferenceRay, index: u32, nodes: AerialPoints, direction: vec3f, empty: bool) -> ReferenceRay {
     var ray = given;
     let sum = Gathered(ray.sun, ray.above, ray.weight);
@@ -185,7 +186,8 @@ fn finished(given: ReferenceRay, index: u32, nodes: AerialPoints, direction: vec
     let dark = DARK * sky_light[2].rgb;
     let tolerance = params.quality.tolerance;
     let steady = all(change.rgb <= tolerance * (result.rgb + dark)) && change.a <= 0.1 * tolerance;
-    if empty || (ray.level > 0u && steady) || ray.level >= MOST_HALVINGS || (ray.level > 0u && evaluations > MOST_EVALUATIONS) {
+    if empty || (ray.level > 0u && steady) || ray.level >= MOST_HALVINGS
+        || (ray.level > 0u && evaluations > MOST_EVALUATIONS) {
         clouds[index] = select(result, vec4f(0.0, 0.0, 0.0, 1.0), empty);
         cloud_depth[index] = select(-1.0, ray.distance / whole, !empty && whole > 0.0);
         samples[index] = evaluations;

@@ -1,15 +1,15 @@
-// Which pixels need rays of their own: pixels between marched ones that look alike are interpolated.
+// Adaptive sampling: pixels between samples of low contrast are interpolated, the others get a ray.
 //
-// A lattice of pixels `lattice` apart, with the last column and row, is known. This halves the distance: each pixel
-// that the finer lattice adds is put on the list of rays, or gets its value here. An invocation has a square of the
-// lattice: the pixel in its middle, and those of its upper and its left edge, which it shares with its neighbours.
+// Samples lie on a grid of spacing `dispatch.lattice`, to which the last column and row belong. `refine` halves the
+// spacing: each new pixel of the grid is interpolated here or added to the ray list. An invocation has a square of the
+// grid and resolves its middle and the middles of its upper and left edges; neighbouring squares share edges.
 #import bindings
 #import camera
 #import contrast
 #import sample_grid
 #import scene_depth
 
-// Lists the pixels of the lattice.
+// Ray list of the initial grid.
 @compute @workgroup_size(GRID_GROUP, GRID_GROUP)
 fn list_grid(@builtin(global_invocation_id) id: vec3u) {
     let last = vec2u(dispatch.march_width, dispatch.strip_rows) - 1u;
@@ -34,11 +34,12 @@ fn refine(@builtin(global_invocation_id) id: vec3u) {
     let low = min(id.xy * dispatch.lattice, last);
     let high = min(low + dispatch.lattice, last);
     let middle = low + half;
-    let has = middle < high; // room for a pixel between the columns, between the rows
+    let has = middle < high; // whether there is a pixel between the columns, and between the rows
     if !any(has) {
         return;
     }
-    // Of the squares above and to the left, narrower behind the last column and row; on the rim the square itself again.
+    // Origins of the squares above and to the left, which are narrower behind the last column and row. At the edge of
+    // the picture it is the square itself.
     let before = (max(low, vec2u(1u)) - 1u) / dispatch.lattice * dispatch.lattice;
 
     let a = read(low);
@@ -60,10 +61,10 @@ fn refine(@builtin(global_invocation_id) id: vec3u) {
     }
 }
 
-// What is known of a pixel.
+// Sample at a pixel.
 struct RaySample {
-    value: vec4f, // as `clouds`
-    distance: vec2f, // opacity times depth, opacity
+    value: vec4f, // premultiplied radiance, transmittance
+    distance: vec2f, // weight times depth, weight
     span: vec2f,
     scene: f32, // m along the ray
 }
@@ -84,8 +85,8 @@ fn lerp_samples(a: RaySample, b: RaySample, share: f32) -> RaySample {
     return RaySample(mix(a.value, b.value, share), mix(a.distance, b.distance, share), vec2f(0.0), NO_SCENE);
 }
 
-// How the corners of squares look: least and most light, least and most transmittance, where the clouds are, and how
-// near the user's scene.
+// Bounds over samples: minimum and maximum of brightness (x, y) and of transmittance, range of distances with cloud,
+// distance of the user's scene.
 struct Bounds {
     light: vec2f,
     transmittance: vec2f,
@@ -108,7 +109,8 @@ fn union_of(a: Bounds, b: Bounds) -> Bounds {
 
 fn resolve(pixel: vec2u, around: Bounds, between: RaySample) {
     let index = pixel.y * dispatch.march_width + pixel.x;
-    // Rays that the user's scene ends say nothing of what lies behind it: each ray beside it is marched, and all of it.
+    // A ray that ends at the user's scene carries no information about what is behind the scene. Pixels beside such a
+    // ray are marched over their full length.
     let open = min(around.scene, scene_at(pixel)) >= NO_SCENE;
     cloud_span[index] = select(vec2f(0.0, 1e30), around.span, open);
     if contrast(around.light, around.transmittance) > params.quality.contrast || !open {

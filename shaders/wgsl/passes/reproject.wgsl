@@ -1,10 +1,11 @@
-// Fills a frame from its own rays, one in each cell, and from the frame before (nubis2015, "reprojection"). In a sparse
-// picture a pixel here is one that is known (sample_grid.wgsl).
+// Temporal reprojection: a frame from one ray in each cell and from the previous frame (nubis2015, "reprojection").
+// "Pixel" in this file is a pixel that holds a sample (sample_grid.wgsl).
 //
-// `predict` reads the history where the pixel of each new ray was; `validate` compares ray and prediction; `reproject` follows
-// the history where it has predicted the rays around, interpolates between these where they look alike, and lists the rest
-// for the march. No value is clipped: radiance and transmittance belong together, and a pixel is followed, interpolated or
-// marched as a whole. So an unchanged picture becomes its still, and the less changes, the nearer to that it stays.
+// `predict` reads the history at the previous position of each new ray. `validate` compares ray and prediction.
+// `reproject` reuses the history where it has predicted the rays around, interpolates between rays of low contrast, and
+// adds the remaining pixels to the ray list. There is no variance clipping: radiance and transmittance belong together,
+// and a pixel is reprojected, interpolated or marched as a whole. An unchanged picture therefore converges to its
+// still, and the smaller the change, the closer a frame is to its still.
 #import bindings
 #import camera
 #import shell
@@ -12,60 +13,67 @@
 #import sample_grid
 #import scene_depth
 
-// Pixels of a cell in each direction: 4, in a sparse picture 2 (reproject.rs).
+// Samples along each side of a cell: 4, or 2 at low resolution (grid.rs).
 override STRIDE: i32 = 4;
 
-// Frames in which every pixel of a cell is marched once: the length of the history of a pixel that has had a ray of its own and
-// has been followed since. An interpolated one counts its frames.
+// Frames in which every pixel of a cell is marched once. It is the history length of pixels that have been marched and
+// reprojected since. The history length of interpolated pixels counts their frames.
 override CYCLE: u32 = u32(STRIDE * STRIDE);
 
-// Contrast between a ray and its prediction up to which the history around is followed: that of adaptive sampling
-// (`quality.contrast`), within these. Measured in flights of five scenes at 480x270, error against a picture of rays alone and
-// share of rays: 0.2 5.6 % of 0.099, 0.4 6.4 % of 0.075, 0.7 7.7 % of 0.066, any 15.5 % of 0.063.
+// Bounds on the tolerance: the contrast between a ray and its prediction up to which the history around is reprojected.
+// Within the bounds it is the threshold of adaptive sampling (`quality.contrast`). Error against a picture of rays
+// alone and fraction of pixels marched, measured in flights of five scenes at 480x270: with 0.2 5.6 % and 0.099, with
+// 0.4 6.4 % and 0.075, with 0.7 7.7 % and 0.066, without a bound 15.5 % and 0.063.
 const LEAST_TOLERANCE = 0.1;
 const MOST_TOLERANCE = 0.4;
 
-// Contrast between the rays around a pixel up to which it is interpolated where it has no history, as a share of
-// `quality.contrast`: they are as far apart as the coarsest of a still, which has finer ones between (0.5: 5.9 %, 1: 6.8 % in a
-// flight of `fair_weather`).
-const INTERPOLATED = 0.5;
+// Contrast between the rays around a pixel without history up to which the pixel is interpolated, relative to
+// `quality.contrast`. The rays are as far apart as samples of the initial grid of a still, which is refined further. In
+// a flight of `fair_weather` the error is 5.9 % with 0.5 and 6.8 % with 1.
+const INTERPOLATION_SHARE = 0.5;
 
-// Width of a cell up to which these hold, radians: half a degree, within which clouds are not lost between rays (refine.rs).
-// In wider ones rays say less of what is between them, and all are less by as much.
+// Maximum width of a cell for these thresholds, radians: half a degree, within which no clouds are lost between rays
+// (grid.rs). In wider cells rays carry less information about the pixels between them, and all thresholds are lower in
+// proportion.
 const WIDEST = 0.0087;
 
-// By how many times their own contrast rays that look alike may differ from their predictions: past that the history shows what is no
-// more, and they are nearer to what is. An error less than the second is rounding, and is not seen.
+// Ghosting test. If rays of low contrast differ from their predictions by more than GHOST times their own contrast, the
+// history shows clouds that have disappeared, and interpolation is more accurate. An error below LEAST_GHOST is
+// rounding, and invisible.
 const GHOST = 4.0;
 const LEAST_GHOST = 1e-3;
 
-// Change of brightness counts as an error by this share where the gain makes up for it: a slow change is followed, a jump is not.
+// Factor on the error of a change of brightness that the gain compensates: slow changes are reprojected, jumps are not.
 const JUMP = 0.6;
 
-// Squares of the ratio of a mean to its standard error below which a change of brightness is noise.
+// Squared ratio of a mean to its standard error below which a change of brightness counts as noise.
 const SIGNIFICANT = 4.0;
 
-// Clouds before the sun shine by the forward peak of their droplets, which falls with about the square of the angle to the sun
-// outside of this width in radians (Jendersie and d'Eon 2023, figure 3): as the sun moves, the spark moves within a cell.
+// Glare: clouds in front of the sun show the forward peak of the phase function of droplets. Outside of GLARE_WIDTH,
+// radians, it falls with about the square (GLARE_SLOPE) of the angle to the sun (Jendersie and d'Eon 2023, figure 3).
+// As the sun moves, the highlight moves within a cell.
 const GLARE_SLOPE = 2.0;
 const GLARE_WIDTH = 0.0044;
-// Within this angle, radians, plus the width of a cell, a pixel may be a hundred times as bright as the next: each has its ray.
+// Angle to the sun, radians, within which, plus the width of a cell, each pixel is marched: a pixel may be a hundred
+// times as bright as its neighbour.
 const SPARK = 0.02;
 
-// How far the history of a pixel may be from where its depth says, in pixels: it belongs to another cloud then. In a flight
-// through clouds of 40 m a frame the error is 5.7 % without and 3.6 % with it.
+// Maximum parallax, pixels: the distance between the position at which the history was read and the position that its
+// depth implies. Beyond it the history belongs to another cloud. In a flight through clouds at 40 m per frame the error
+// is 5.7 % without this test and 3.6 % with it.
 const PARALLAX = 1.0;
 
-// How many times as far as its nearest the user's scene may be around a cell, now and in the frame before. Past that
-// there is an edge, beside which neighbours and past say nothing of a pixel, as their rays have ended elsewhere.
+// Maximum ratio of the largest to the smallest distance of the user's scene around a cell, in this frame and the
+// previous one. Above it the scene has an edge: rays beside it have ended elsewhere, and neither neighbours nor history
+// carry information about a pixel there.
 const SCENE_STEP = 1.1;
 
-// Transmittance past which a cell has no say in whether a frame is like the one before.
+// Transmittance above which a cell does not vote on whether the frame is a still.
 const CLEAR = 0.98;
 
-// What the history says of a ray (`CellPast.source`).
-const UNSEEN = 0u; // it was not in the picture
-const GUESSED = 1u;
+// Origin of the prediction of a ray (`CellPast.source`).
+const UNSEEN = 0u; // outside the previous picture
+const INTERPOLATED = 1u;
 const MARCHED = 2u;
 
 @compute @workgroup_size(8, 8)
@@ -77,7 +85,8 @@ fn predict(@builtin(global_invocation_id) id: vec3u) {
     var past: CellPast;
     past.distance = nearest_cloud(at);
     past.ray_distance = current_depth[cell_index(at)];
-    // Where the cloud seen here was in the frame before. Where no cloud is near, the sky stands still.
+    // Position in the previous frame of the cloud at this cell. Cells without cloud nearby move like a point at
+    // `far_distance`.
     let centre = pixel_place(vec2f(at * STRIDE) + 0.5 * f32(STRIDE));
     let away = select(frame.view.far_distance, past.distance, past.distance >= 0.0);
     let direction = view_direction(centre).xyz;
@@ -89,14 +98,14 @@ fn predict(@builtin(global_invocation_id) id: vec3u) {
     let sun_before = acos(clamp(dot(normalize(away * direction + way), frame.sky.previous_sun), -1.0, 1.0));
     let glare = GLARE_SLOPE * abs(sun - sun_before) / (sun + GLARE_WIDTH);
     past.glare = select(glare, UNKNOWN, sun < SPARK + f32(STRIDE) * past.width);
-    // What stands still is where it was, to the bit: a narrow view, a pole of a panorama or a wide picture turn the
-    // rounding of a direction into a good part of a pixel.
+    // Without motion the position is exactly that of the pixel. In a narrow view, at a pole of a panorama or in a wide
+    // picture, rounding of the direction is a good part of a pixel.
     let motion = select(shortest_way(was.xy - centre) / f32(spacing()), vec2f(0.0), frame.view.moving == 0u);
-    // What has moved by whole pixels reads them, exactly.
+    // Motion by whole pixels reads the history exactly.
     past.motion = select(motion, round(motion), abs(motion - round(motion)) < vec2f(1e-3));
 
-    // The last cells hang over the edge: their rays are those of the edge, or, in a sparse picture, beyond it, where nothing
-    // is followed.
+    // The last cells may extend beyond the picture. Their rays are those of its edge; at low resolution they lie beyond
+    // it, where nothing is reprojected.
     let cell_pixel = at * STRIDE + own_pixel();
     let pixel = min(cell_pixel, vec2i(sample_count()) - 1);
     let inside = !LOW_RESOLUTION || all(cell_pixel == pixel);
@@ -114,22 +123,23 @@ fn predict(@builtin(global_invocation_id) id: vec3u) {
     past.predicted = select(current[cell_index(at)], from_history, inside);
     let seen = (was.z > 0.0 || frame.view.moving == 0u) && was_known(shifted) && is_finite4(past.predicted);
     let length = history_length[pixel_index(shifted)];
-    past.source = select(UNSEEN, select(GUESSED, MARCHED, inside && length == CYCLE), seen || !inside);
+    past.source = select(UNSEEN, select(INTERPOLATED, MARCHED, inside && length == CYCLE), seen || !inside);
     cells[cell_index(at)] = past;
 }
 
-// Compares the new ray of a cell with what the history predicts, and those around.
+// Validation of the history: compares the rays of a cell and of those around with their predictions.
 @compute @workgroup_size(8, 8)
 fn validate(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= dispatch.march_width || id.y >= dispatch.strip_rows {
         return;
     }
     let at = vec2i(id.xy);
-    // Change of brightness, (now - before) / (now + before), of the cells around whose pixels have had rays of their own: its
-    // mean, by opacity, and how sure that is. A share, as one spark would outweigh a ratio of sums.
-    var weights = vec2f(0.0); // and their squares
+    // Relative change of brightness, (now - before) / (now + before), of the cells around whose predictions have been
+    // marched: mean weighted by opacity, and its significance. Each cell contributes a ratio: in a ratio of sums one
+    // highlight would outweigh all others.
+    var weights = vec2f(0.0); // sums of weights and of their squares
     var sum = vec3f(0.0);
-    var moments = vec2f(0.0); // of the mean over the channels
+    var moments = vec2f(0.0); // sums for the mean over the channels and for its square
     var i = 0;
     loop {
         let near = cell_index(at + vec2i(i % 3, i / 3) - 1);
@@ -152,7 +162,7 @@ fn validate(@builtin(global_invocation_id) id: vec3u) {
     let past = cells[index];
     let weight = max(weights.x, 1e-6);
     let mean = moments.x / weight;
-    // The squared standard error of the mean says how much of it is noise (James and Stein 1961).
+    // Fraction of the mean that is significant, from its squared standard error (James and Stein 1961).
     let noise = max(moments.y / weight - mean * mean, 0.0) * weights.y / (weight * weight);
     let sure = select(0.0, max(1.0 - SIGNIFICANT * noise / (mean * mean), 0.0), mean != 0.0);
     let change = clamp(sure * sum / weight, vec3f(-MOST_CHANGE), vec3f(MOST_CHANGE));
@@ -161,7 +171,8 @@ fn validate(@builtin(global_invocation_id) id: vec3u) {
     let ray = current[index];
     let with_gain = vec4f(past.predicted.rgb * gain, past.predicted.a);
     let error = max(contrast_of_two(ray, with_gain), JUMP * contrast_of_two(ray, past.predicted));
-    // Three clouded cells outvote one: where a fourth of them is not as predicted, nothing of the history is kept.
+    // A clouded cell whose prediction fails has three votes for a still, one whose prediction holds has one vote
+    // against it. If more than a fourth fail, none of the history is reused.
     let clouded = past.source != UNSEEN && min(ray.a, past.predicted.a) < CLEAR;
     if clouded {
         atomicAdd(&votes, select(-1, 3, error > tolerance(past)));
@@ -170,25 +181,26 @@ fn validate(@builtin(global_invocation_id) id: vec3u) {
     cells[index].error = select(max(error, past.glare), UNKNOWN, past.source == UNSEEN);
 }
 
-// The largest change between two frames that is followed, to four times the brightness: past that nothing is left of a history.
+// Maximum change of brightness between two frames, (now - before) / (now + before): a factor of four. Beyond it the
+// history is useless.
 const MOST_CHANGE = 0.6;
-// More than any contrast.
+// Above any contrast.
 const UNKNOWN = 1e9;
 
-// What the pixels of a cell have in common.
+// Values shared by the pixels of a cell.
 struct Cell {
     corner: vec2i, // its first pixel
-    shift: vec2i, // whole pixels to where it was
+    shift: vec2i, // offset to its position in the previous frame, whole pixels
     past: CellPast,
-    // The rays of the nine cells around, row by row, and their gains.
+    // Rays of the 3x3 cells around, row by row, and their gains.
     above: mat3x4f,
     level: mat3x4f,
     below: mat3x4f,
     gain_above: mat3x3f,
     gain_level: mat3x3f,
     gain_below: mat3x3f,
-    // Between its pixel and those left or right of it, above or below (`quarter`): the largest error of a prediction, that
-    // of pixels that have had rays of their own, and the contrast of the rays.
+    // Values for each quarter of the cell around its marched pixel (`quarter`), from the rays around that quarter:
+    // maximum error of the predictions, maximum error of the marched ones, contrast of the rays.
     error: vec4f,
     own_error: vec4f,
     contrast: vec4f,
@@ -203,8 +215,8 @@ fn reproject(@builtin(global_invocation_id) id: vec3u) {
     let at = vec2i(vec2u(id.x, dispatch.first_row / u32(STRIDE) + id.y));
     let cell = read_cell(at);
     let motion = cell.past.motion;
-    // The frame before between pixel centres, by Catmull-Rom splines: linear interpolation, repeated every frame, would
-    // blur. Four rows at a time make one.
+    // History between pixel centres by Catmull-Rom splines: linear interpolation, repeated every frame, would blur.
+    // Each row of output uses four rows of the history.
     let corner = cell.corner + vec2i(floor(motion)) - 1;
     let alone = SCENE && frame.view.moving > 0u && has_scene_edge(at, cell.corner, corner);
     let f = fract(motion);
@@ -214,7 +226,7 @@ fn reproject(@builtin(global_invocation_id) id: vec3u) {
     var b = history_row(corner + vec2i(0, 1), across, f.x);
     var c = history_row(corner + vec2i(0, 2), across, f.x);
     var y = 0;
-    // Left at its end: lavapipe runs a loop that is left at its start once more, for nothing.
+    // The loop tests at its end: lavapipe runs one iteration more of a loop that tests at its start.
     loop {
         let d = history_row(corner + vec2i(0, y + 3), across, f.x);
         let cubic = a.cubic * down.x + b.cubic * down.y + c.cubic * down.z + d.cubic * down.w;
@@ -263,7 +275,7 @@ fn read_cell(at: vec2i) -> Cell {
         contrast(vec2f(least.z, most.z), vec2f(thickest.z, clearest.z)),
         contrast(vec2f(least.w, most.w), vec2f(thickest.w, clearest.w)),
     );
-    // Beyond the outermost rays there is nothing to interpolate.
+    // Pixels beyond the outermost rays are not interpolated.
     let last = vec2i(vec2u(dispatch.march_width, dispatch.strip_rows)) - 1;
     let wraps = CAMERA == EQUIRECT && !LOW_RESOLUTION;
     let outside = vec4<bool>(at.y == 0, at.y == last.y, at.x == 0 && !wraps, at.x == last.x && !wraps);
@@ -272,7 +284,7 @@ fn read_cell(at: vec2i) -> Cell {
     return cell;
 }
 
-// Contrast up to which a history is followed, and, below it, up to which there is interpolation.
+// Maximum contrast between ray and prediction for reprojection.
 fn tolerance(past: CellPast) -> f32 {
     return clamp(params.quality.contrast, LEAST_TOLERANCE, MOST_TOLERANCE) * narrowness(past);
 }
@@ -292,11 +304,11 @@ fn past_row(cell: vec2i) -> PastRow {
     let b = cells[cell_index(cell)];
     let c = cells[cell_index(cell + vec2i(1, 0))];
     let error = vec3f(a.error, b.error, c.error);
-    let guessed = vec3<bool>(a.source == GUESSED, b.source == GUESSED, c.source == GUESSED);
+    let guessed = vec3<bool>(a.source == INTERPOLATED, b.source == INTERPOLATED, c.source == INTERPOLATED);
     return PastRow(mat3x3f(a.gain, b.gain, c.gain), error, select(error, vec3f(0.0), guessed));
 }
 
-// The largest of the four numbers around each quarter of a cell: left and right above its pixel, left and right below.
+// Maximum around each quarter of a cell: above its pixel left and right, below it left and right.
 fn largest(above: vec3f, level: vec3f, below: vec3f) -> vec4f {
     let a = max(above.xy, above.yz);
     let b = max(level.xy, level.yz);
@@ -312,15 +324,16 @@ fn alphas(row: mat3x4f) -> vec3f {
     return vec3f(row[0].a, row[1].a, row[2].a);
 }
 
-// One of four numbers: that of the quarter that a pixel of the cell is in.
+// Value of the quarter that contains a pixel of the cell.
 fn quarter(numbers: vec4f, place: vec2i) -> f32 {
     let row = select(numbers.zw, numbers.xy, place.y < own_pixel().y);
     return select(row.y, row.x, place.x < own_pixel().x);
 }
 
-// The cubic interpolation of the history as far toward it from the linear one as all channels stay within those of the four
-// pixels around: past them there are rings along edges, and clouds that are black where radiance and transmittance
-// overshoot by different shares. `above` and `below` are the rows of those four, `x` is the column.
+// Limiter of cubic interpolation: the value between linear and cubic interpolation that is closest to cubic and has all
+// channels within the range of the four pixels around. Without it edges have rings, and clouds are black where radiance
+// and transmittance overshoot by different fractions. `above` and `below` are the rows of the four pixels, `x` is the
+// column.
 fn limited(cubic: vec4f, linear: vec4f, above: HistoryRow, below: HistoryRow, x: u32) -> vec4f {
     let beyond = cubic - linear;
     let low = min(above.low[x], below.low[x]) - linear;
@@ -330,8 +343,8 @@ fn limited(cubic: vec4f, linear: vec4f, above: HistoryRow, below: HistoryRow, x:
     return linear + min(min(share.x, share.y), min(share.z, share.w)) * beyond;
 }
 
-// Whether the frame is a still: where most rays are not what the history says, or where more pixels are listed than a
-// still marches. The list is empty then.
+// Decision whether the frame is a still: if more than a fourth of the predictions fail, or if more pixels are listed
+// than a still marches (`most_listed`). The ray list is empty then.
 @compute @workgroup_size(1)
 fn choose() {
     is_still = select(0u, 1u, atomicLoad(&votes) > 0 || f32(atomicLoad(&ray_count)) > most_listed.x);
@@ -340,19 +353,19 @@ fn choose() {
     }
 }
 
-// A still as the history of the frames after it. Its coarsest lattice has had rays of their own; between those it is interpolated,
-// or its rays have looked for cloud only where their neighbours have found it (passes/refine).
+// History length of a still, for the frames after it. Samples of its initial grid have been marched. The other pixels
+// are interpolated, or their rays have searched for cloud only in the range of their neighbours (passes/refine).
 @compute @workgroup_size(GRID_GROUP, GRID_GROUP)
 fn begin(@builtin(global_invocation_id) id: vec3u) {
     let size = sample_count();
     if any(id.xy >= size) {
         return;
     }
-    let on_lattice = (id.xy % dispatch.lattice == vec2u(0u)) | (id.xy == size - 1u);
-    followed[id.y * size.x + id.x] = select(CYCLE - 1u, CYCLE, all(on_lattice));
+    let on_grid = (id.xy % dispatch.lattice == vec2u(0u)) | (id.xy == size - 1u);
+    followed[id.y * size.x + id.x] = select(CYCLE - 1u, CYCLE, all(on_grid));
 }
 
-// The frame before in the size of this one, and known at as many pixels: what lies between its own.
+// History resampled to the size and the sample spacing of this frame.
 @compute @workgroup_size(8, 8)
 fn rescale(@builtin(global_invocation_id) id: vec3u) {
     let size = sample_count();
@@ -370,34 +383,38 @@ fn rescale(@builtin(global_invocation_id) id: vec3u) {
     clouds[index] = mix(above, below, f.y);
     let nearest = previous_index(vec2i(round(at)));
     cloud_depth[index] = history_depth[nearest];
-    // A ray of its own, or as many guesses.
+    // CYCLE for marched pixels; for interpolated ones their number of frames.
     let past = history_length[nearest];
     followed[index] = select(min(past, CYCLE - 1u), CYCLE, past == frame.view.previous_cycle);
 }
 
 fn previous_index(pixel: vec2i) -> u32 {
-    let size = sample_count_by(vec2u(frame.view.previous_width, frame.view.previous_height), frame.view.previous_spacing);
+    let size = sample_count_by(
+        vec2u(frame.view.previous_width, frame.view.previous_height),
+        frame.view.previous_spacing,
+    );
     let inside = vec2u(clamp(pixel, vec2i(0), vec2i(size) - 1));
     return inside.y * size.x + inside.x;
 }
 
-// Where in the picture a place among the known pixels is; both have the centres of theirs at half-integers.
+// Position in the picture of a position on the sample grid, both in pixels with centres at half-integers.
 fn pixel_place(place: vec2f) -> vec2f {
     return (place - 0.5) * f32(spacing()) + 0.5;
 }
 
-// The pixel of a cell that has been marched.
+// Pixel of a cell that is marched in this frame.
 fn own_pixel() -> vec2i {
     return vec2i(vec2u(dispatch.subpixel_x, dispatch.subpixel_y) / spacing());
 }
 
-// Whether the frame before has a pixel.
+// Whether the previous frame has a pixel.
 fn was_known(pixel: vec2i) -> bool {
     let has = all(pixel >= vec2i(0)) && all(pixel < vec2i(sample_count()));
     return select(in_picture(pixel), has && (CAMERA != FISHEYE || in_picture(i32(TILE) * pixel)), LOW_RESOLUTION);
 }
 
-// Fills a pixel of a cell, for what the frame before has in its place; `alone`, it is marched instead.
+// Fills a pixel of a cell. `old` is the history at its previous position; with `alone` the pixel is marched without use
+// of history and neighbours.
 fn fill(cell: Cell, place: vec2i, old: vec4f, alone: bool) {
     let pixel = cell.corner + place;
     if any(pixel >= vec2i(sample_count())) {
@@ -405,9 +422,9 @@ fn fill(cell: Cell, place: vec2i, old: vec4f, alone: bool) {
     }
     let index = pixel_index(pixel);
     let subpixel = own_pixel();
-    let is_fresh = all(place == subpixel);
+    let is_current = all(place == subpixel);
 
-    // The rays around, and their gains, where this pixel is between them.
+    // Interpolation of the rays around and of their gains at this pixel.
     let offset = vec2f(subpixel - place) / f32(STRIDE);
     let x = hats(offset.x);
     let y = hats(offset.y);
@@ -419,19 +436,20 @@ fn fill(cell: Cell, place: vec2i, old: vec4f, alone: bool) {
     let depth = history_depth[pixel_index(shifted)];
     let error = select(quarter(cell.error, place), quarter(cell.own_error, place), length == CYCLE);
     let contrast = quarter(cell.contrast, place);
-    let least = INTERPOLATED * params.quality.contrast * narrowness(cell.past);
+    let least = INTERPOLATION_SHARE * params.quality.contrast * narrowness(cell.past);
     let alike = contrast <= least;
     let ghost = alike && error > max(GHOST * contrast, LEAST_GHOST);
     let seen = was_known(shifted) && is_finite4(old);
     let followed_value = vec4f(old.rgb * gain, old.a);
-    // A cloud smaller than a cell is in the history alone, or no more: a ray tells.
+    // A cloud smaller than a cell is in the history alone, or has disappeared. The pixel is marched if history and
+    // interpolation differ.
     let agreed = !seen || contrast_of_two(followed_value, guess) <= least;
     let follows = !ghost && seen && error <= cell.tolerance && parallax(cell, depth) <= PARALLAX;
 
     var value = guess;
     var value_depth = cell.past.distance;
     var value_length = 1u;
-    if is_fresh {
+    if is_current {
         value = cell.level[1];
         value_depth = cell.past.ray_distance;
         value_length = CYCLE;
@@ -447,13 +465,13 @@ fn fill(cell: Cell, place: vec2i, old: vec4f, alone: bool) {
         value = vec4f(0.0, 0.0, 0.0, 1.0);
     }
     clouds[index] = vec4f(max(value.rgb, vec3f(0.0)), saturate(value.a));
-    // Thinner than f32 tells from nothing, a cloud may still shine from where it is.
+    // A cloud whose opacity is below the precision of f32 may have radiance, and keeps its depth.
     let clear = value.a >= 1.0 && all(value.rgb <= vec3f(0.0));
     followed[index] = value_length;
     cloud_depth[index] = select(max(value_depth, 0.0), -1.0, clear);
 }
 
-// By how many pixels a cloud at a depth has moved otherwise than the cell, at most.
+// Upper bound of the parallax of a cloud at a depth relative to the cell, pixels.
 fn parallax(cell: Cell, depth: f32) -> f32 {
     let far = vec2f(frame.view.far_distance);
     let distances = vec2f(depth, cell.past.distance);
@@ -462,15 +480,16 @@ fn parallax(cell: Cell, depth: f32) -> f32 {
     return way * abs(inverse.x - inverse.y) / cell.past.width;
 }
 
-// Whether the scene has an edge among the pixels of a cell, the marched ones around it, and those of the past that are read.
+// Whether the scene has an edge among the pixels of a cell, the marched pixels around it and the history that the cell
+// reads.
 fn has_scene_edge(at: vec2i, corner: vec2i, past_corner: vec2i) -> bool {
     let size = vec2i(vec2u(dispatch.march_width, dispatch.strip_rows));
     var near = NO_SCENE;
     var far = 0.0;
     var i = 0;
     loop {
-        // Seven by seven pixels of the past, of which the first four by four are the cell's own now, and the first three
-        // by three number its neighbours.
+        // 7x7 pixels of the history. The first 4x4 of the places are also those of the cell's own pixels, the first 3x3
+        // those of its neighbours.
         let place = vec2i(i % 7, i / 7);
         let own = scene_now(corner + min(place, vec2i(STRIDE - 1)));
         let neighbour = clamp(at + min(place, vec2i(2)) - 1, vec2i(0), size - 1);
@@ -494,7 +513,7 @@ fn scene_past(pixel: vec2i) -> f32 {
     return textureLoad(scene_before, scene_texel_of(pixel_index(pixel)), 0).r;
 }
 
-// The three marched pixels around a cell in its row.
+// Marched pixels of three cells in a row, around a cell.
 fn fresh_row(cell: vec2i) -> mat3x4f {
     return mat3x4f(
         current[cell_index(cell - vec2i(1, 0))],
@@ -503,12 +522,13 @@ fn fresh_row(cell: vec2i) -> mat3x4f {
     );
 }
 
-// Weights of linear interpolation for a marched pixel `offset` cells away, and for those before and after it.
+// Weights of linear interpolation for the marched pixel `offset` cells away, in the middle, and for the ones before and
+// after it.
 fn hats(offset: f32) -> vec3f {
     return max(1.0 - abs(vec3f(-1.0, 0.0, 1.0) + offset), vec3f(0.0));
 }
 
-// Distance of the cloud nearest to the middle of a cell among the nine marched pixels around it, -1 if there is none.
+// Distance of the cloud closest to the centre of a cell among the 3x3 marched pixels around it, m, -1 if there is none.
 fn nearest_cloud(cell: vec2i) -> f32 {
     let subpixel = vec2f(own_pixel()) + 0.5;
     var distance = -1.0;
@@ -549,11 +569,11 @@ fn pixel_index(pixel: vec2i) -> u32 {
     return u32(inside.y * size.x + inside.x);
 }
 
-// Four pixels of a row of the frame before, between its own across, from seven.
+// Four interpolated values along a row of the history, from seven pixels.
 struct HistoryRow {
     cubic: mat4x4f,
     linear: mat4x4f,
-    low: mat4x4f, // the lesser of the two around each
+    low: mat4x4f, // minimum of the two pixels around each value
     high: mat4x4f,
 }
 
@@ -587,7 +607,8 @@ fn catmull_rom(f: f32) -> vec4f {
     );
 }
 
-// NaN would live in the history for ever, and lavapipe optimises x != x away: test the bits (hazard 11).
+// NaN in the history persists for ever, and lavapipe optimises x != x away. The bits are tested instead
+// (docs/numerics.md).
 fn is_finite4(v: vec4f) -> bool {
     return all((bitcast<vec4u>(v) & vec4u(0x7fffffffu)) < vec4u(0x7f800000u));
 }

@@ -1,5 +1,5 @@
-// How much direct sun comes through the clouds to a plane (the user's map), or to the ground around the eye (for pictures):
-// each texel looks at the sun.
+// Shadow maps: transmittance of the clouds toward the sun, on a plane (the user's map), or on the ground around the eye
+// (the shadow clipmap of pictures). Each texel marches one or more sun rays.
 #import bindings
 #import workgroups
 #import density
@@ -7,13 +7,13 @@
 #import shell
 #import ground_shadow
 
-// Most steps of a ray toward the sun: of the user's map, and of the ground around the eye. And the fewest.
+// Largest number of steps of a sun ray, for the user's map and for the ground; smallest number for both.
 const MAP_STEPS = 2048.0;
 const GROUND_STEPS = 48.0;
 const FEWEST = 12.0;
-// Most places that a texel of the ground is the mean of.
+// Largest number of sun rays per texel of the ground.
 const MOST_PLACES = 16.0;
-// Behind this optical depth is less than a thousandth of the sun.
+// Optical depth beyond which less than a thousandth of the sunlight remains.
 const DARK = 7.0;
 
 @compute @workgroup_size(GRID_GROUP, GRID_GROUP)
@@ -22,7 +22,7 @@ fn shadow_map(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= frame.view.width || id.y >= dispatch.rows {
         return;
     }
-    // From the middle, which is where the eye stands: east and north.
+    // Offset from the centre of the map, where the eye is: east and north.
     let size = vec2f(f32(frame.view.width), f32(frame.view.height));
     let at = (vec2f(texel) + 0.5 - 0.5 * size) * vec2f(1.0, -1.0) * frame.sky.shadow_texel;
     let p = vec3f(at, 0.0);
@@ -46,7 +46,7 @@ fn shadow_ground(
     let texel = shadow_texel(level);
     let at = (vec2f(vec2u(id.x, id.y % SHADOW_SIDE)) + 0.5 - 0.5 * f32(SHADOW_SIDE)) * texel;
     let fine = select(max(2.0 * finest_feature(), texel), max(frame.sky.voxel, 0.5 * texel), VOLUME);
-    // Of texels that are wider than clouds the mean of several places, in a low-discrepancy sequence (R2).
+    // Texels wider than clouds average several positions of a low-discrepancy sequence (R2).
     let width = texel / frame.sky.leap_scale;
     let places = select(clamp(ceil(width * width), 1.0, MOST_PLACES), 1.0, VOLUME);
     var sum = vec4f(0.0);
@@ -62,8 +62,8 @@ fn shadow_ground(
     textureStore(map_out, id.xy, sum / places);
 }
 
-// Lets each level go over into the next in the outer fifth of its reach, and the last into its mean. Where there are finer
-// ones, which is where those who read a level there look for means, a texel becomes the mean of the four.
+// Blends each level into the next over the outer fifth of its reach, and the last level into its mean. Where a finer
+// level exists, a texel becomes the mean of its four finer texels: coarse levels are read there for averages.
 @compute @workgroup_size(8, 8)
 fn shadow_blend(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= SHADOW_SIDE || id.y >= SHADOW_SIDE * SHADOW_LEVELS {
@@ -76,7 +76,7 @@ fn shadow_blend(@builtin(global_invocation_id) id: vec3u) {
     let beyond = select(shadow_in_level(q, min(level + 1u, SHADOW_LEVELS - 1u)), mean, last);
     let edge = smoothstep(0.8, 1.0, max(abs(q.x), abs(q.y)) / shadow_reach(level));
     var own = textureLoad(ground_shadow, id.xy, 0);
-    // Not as far as those who want the finest level that holds a place read this one.
+    // The margin excludes texels that reads of the finest level at hand interpolate.
     let finer = shadow_reach(level) * 0.5 - 2.0 * shadow_texel(level);
     if level > 0u && max(abs(q.x), abs(q.y)) < finer {
         own = shadow_in_level(q, level - 1u);
@@ -103,9 +103,9 @@ fn shadow_mean(@builtin(local_invocation_id) id: vec3u) {
     }
 }
 
-// Optical depth of the marched clouds from a point to the sun, and of what of them is over a quarter, a half and three quarters
-// of their height, from the far end on, so that what is behind `DARK` is dark in all of them. In steps of `fine` metres, or
-// longer ones.
+// Optical depth of the marched clouds from a point to the sun (x), and of their parts above a quarter, a half and three
+// quarters of the height range (y, z, w). The march starts at the far end, so that clouds which reach `DARK` are dark
+// in all channels. Steps are `fine` metres long, or longer if that exceeds `most` steps.
 fn cloud_depth_to_sun(p: vec3f, fine: f32, most: f32) -> vec4f {
     let s = cloud_stretches_from(p, frame.sky.sun_direction);
     let length = s.first + s.second;
@@ -113,7 +113,7 @@ fn cloud_depth_to_sun(p: vec3f, fine: f32, most: f32) -> vec4f {
     let step = length / count;
     var depth = vec4f(0.0);
     var i = 0.0;
-    // A loop in a loop, as in passes/march: where the weather alone says that there is nothing, nothing else is read.
+    // Nested loops: the inner one skips samples that are empty by their weather alone, without further reads.
     loop {
         var column = WeatherSample();
         var q = vec3f(0.0);
@@ -121,8 +121,8 @@ fn cloud_depth_to_sun(p: vec3f, fine: f32, most: f32) -> vec4f {
             let at = p + stretch_distance(s, (count - i - 0.5) * step) * frame.sky.sun_direction;
             let found = cloud_column(at, altitude_at(at));
             i += 1.0;
-            // Left in two places, with what was found or with nothing: of what is the same wherever a loop is left, lavapipe
-            // keeps the last turn's even for those that left before (docs/numerics.md).
+            // Two exits, with a sample or with none. With one exit, lavapipe gives a ray that has left the loop the
+            // value of the other rays' next iteration (docs/numerics.md).
             if found.limit > 0.0 {
                 column = found;
                 q = at;

@@ -1,17 +1,18 @@
-// Bakes the sky around the camera, how much of it lies before each distance, and what it and the sun give to the clouds.
+// Bakes the sky-view LUT, the aerial-perspective LUT, and the light of sky and sun on the clouds.
 #import bindings
 #import atmosphere
 #import aerial
 
-// Steps of a ray of the sky with the sun low and high, and sines of its height (4 and 10 degrees) between which they change: the
-// edge of the planet's shadow, which rays cross at dusk, needs more. Largest error of a direction against 384 steps, from
-// 10 m to 100 km: 24 steps 1.2 % with the sun at 5 degrees or higher, 4.5 % at 2, 35 % at -3; 48 steps 1 %, at -3 5 %.
+// Steps of a ray with a low and with a high sun, and the sines of its elevation (4 and 10 degrees) between which they
+// change. Rays at dusk cross the edge of the planet's shadow, which takes more steps. Largest error of a direction
+// against 384 steps, at altitudes from 10 m to 100 km. 24 steps: 1.2 % with the sun at 5 degrees or higher, 4.5 % at 2,
+// 35 % at -3. 48 steps: 1 %, at -3 5 %.
 const STEPS_LOW = 48.0;
 const STEPS_HIGH = 24.0;
 const SUN_LOW = 0.07;
 const SUN_HIGH = 0.175;
 
-// The radiance of the sky by azimuth from the sun and angle from the horizon.
+// Sky-view LUT: radiance by azimuth from the sun and angle from the horizon.
 @compute @workgroup_size(8, 8)
 fn sky_view_bake(@builtin(global_invocation_id) id: vec3u) {
     let size = textureDimensions(map_out);
@@ -23,7 +24,7 @@ fn sky_view_bake(@builtin(global_invocation_id) id: vec3u) {
     textureStore(map_out, id.xy, vec4f(radiance, 1.0));
 }
 
-// The inverse of sky_coordinates, for texel centres.
+// Inverse of `sky_coordinates` at texel centres.
 fn texel_direction(texel: vec2f, size: vec2f) -> vec3f {
     let azimuth = texel.x / (size.x - 1.0) * PI;
     let v = (texel.y + 0.5) / size.y;
@@ -33,11 +34,11 @@ fn texel_direction(texel: vec2f, size: vec2f) -> vec3f {
     return sky_direction(azimuth, elevation);
 }
 
-// The direction at an azimuth from the sun and an angle above the horizontal plane.
+// Direction at an azimuth from the sun and an elevation above the horizontal plane.
 fn sky_direction(azimuth: f32, elevation: f32) -> vec3f {
     var toward = frame.sky.sun_direction - dot(frame.sky.sun_direction, frame.view.zenith) * frame.view.zenith;
     if length(toward) < 1e-4 {
-        // The sun at the zenith: all azimuths are alike.
+        // A sun at the zenith has no azimuth: any reference will do.
         toward = cross(frame.view.zenith, vec3f(0.6, 0.8, 0.0));
     }
     toward = normalize(toward);
@@ -46,13 +47,13 @@ fn sky_direction(azimuth: f32, elevation: f32) -> vec3f {
     return cos(elevation) * level + sin(elevation) * frame.view.zenith;
 }
 
-// Radiance of the air along a direction from the camera, up to the ground or to space, and of the night behind it.
+// Radiance of the air along a direction from the eye, up to the ground or to space, and of the night sky behind it.
 fn air_radiance(direction: vec3f) -> vec3f {
     let way = air_segment(direction);
     if params.atmosphere.enabled == 0u || way.length <= 0.0 {
         return vec3f(0.0);
     }
-    // By squares from the lowest point of the ray, where the air is densest.
+    // Quadratic spacing from the lowest point of the ray, where the air is densest.
     let b = frame.view.centre_distance * dot(frame.view.zenith, direction);
     let lowest = clamp(-b - way.start, 0.0, way.length);
     let from_s = -sqrt(lowest);
@@ -69,7 +70,7 @@ fn air_radiance(direction: vec3f) -> vec3f {
     return params.sun.irradiance * light.radiance + night;
 }
 
-// Light and optical depth of the air up to some distance, for a sun of irradiance 1.
+// Inscattered radiance and optical depth of the air up to a distance, for a sun of irradiance 1.
 struct AirLight {
     radiance: vec3f,
     depth: vec3f,
@@ -82,15 +83,21 @@ fn air_step(before: AirLight, direction: vec3f, t: f32, step: f32) -> AirLight {
     let parts = air_parts(h);
     let one_minus_cosine = one_minus_cos(direction, frame.sky.sun_direction);
     let once = air_scattering_toward(parts, one_minus_cosine) * sunlight(h, mu_sun);
-    let again = scattered_again(parts, air_scattered(h, mu_sun), mu_sun, cos_zenith_at(p, direction), 1.0 - one_minus_cosine);
+    let again = scattered_again(
+        parts,
+        air_scattered(h, mu_sun),
+        mu_sun,
+        cos_zenith_at(p, direction),
+        1.0 - one_minus_cosine,
+    );
     let source = once + again;
     let x = air_extinction(parts) * step;
     let radiance = before.radiance + exp(-before.depth) * source * step * one_minus_exp_over3(x);
     return AirLight(radiance, before.depth + x);
 }
 
-// The share of the sky's radiance that comes from before a distance, by direction and by the root of that distance. The night is
-// behind all air.
+// Aerial-perspective LUT: fraction of the sky's radiance from before a distance, by direction and square root of that
+// distance. The night sky is behind all air.
 @compute @workgroup_size(8, 8)
 fn aerial_perspective_bake(@builtin(global_invocation_id) id: vec3u) {
     let size = textureDimensions(volume_out);
@@ -115,13 +122,17 @@ fn aerial_perspective_bake(@builtin(global_invocation_id) id: vec3u) {
     let night = select(exp(-light.depth) * params.atmosphere.night, vec3f(0.0), way.grounded);
     let whole = params.sun.irradiance * light.radiance + night;
     for (var i = 0u; i < SHARE_SLICES; i++) {
-        let share = select(vec3f(0.0), params.sun.irradiance * reached[i] / max(whole, vec3f(1e-30)), whole > vec3f(1e-20));
+        let share = select(
+            vec3f(0.0),
+            params.sun.irradiance * reached[i] / max(whole, vec3f(1e-30)),
+            whole > vec3f(1e-20),
+        );
         textureStore(volume_out, vec3u(id.xy, i), vec4f(share, 1.0));
     }
 }
 
-// Four colours: ambient radiance from above and from below at the middle of the clouds, irradiance of the sun there and at
-// the high clouds.
+// Light on the clouds: ambient radiance from above and from below at the middle of the clouds; irradiance of the sun
+// there and at the high clouds.
 @compute @workgroup_size(1)
 fn sky_light_bake() {
     let middle = 0.5 * (params.clouds.base + params.clouds.top);

@@ -1,9 +1,10 @@
-// Bakes the optical depth of the air from every altitude to space, by direction (Hillaire 2020, "transmittance").
+// Bakes the transmittance LUT: optical depth of the air from any altitude to space, by direction (Hillaire 2020,
+// "transmittance").
 #import bindings
 #import atmosphere
 
-// Pieces of a ray, each in closed form: on the longest, 1100 km from the ground through the horizon, the planet's curve
-// is 50 m high in one of them.
+// Pieces of a ray, each integrated in closed form. On the longest ray, 1100 km from the ground through the horizon, the
+// planet curves by 50 m within a piece.
 const PIECES = 64u;
 
 @compute @workgroup_size(8, 8)
@@ -12,7 +13,7 @@ fn transmittance_bake(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= size) {
         return;
     }
-    // The inverse of transmittance_lut_coordinates, for texel centres.
+    // Inverse of `transmittance_lut_coordinates` at texel centres.
     let at = vec2f(id.xy) / vec2f(size - 1u);
     let radius = params.atmosphere.planet_radius;
     let whole = sqrt(AIR_TOP * (2.0 * radius + AIR_TOP));

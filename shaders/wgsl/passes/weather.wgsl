@@ -1,5 +1,5 @@
-// Bakes the weather map: coverage, type and precipitation over a square that repeats (nubis2015, thesis2018, vsu2022);
-// and mixes such maps.
+// Bakes the weather map: coverage, type and precipitation over a tileable square (nubis2015, thesis2018, vsu2022). Also
+// mixes weather maps.
 #import bindings
 #import gradient_noise
 
@@ -7,10 +7,10 @@ const COVERAGE_SALT = 7u;
 const TYPE_SALT = 47u;
 const RAIN_SALT = 77u;
 
-// weather.noise; the others are compiled out.
+// Specialization by `weather.noise`.
 override WEATHER_NOISE: u32 = 0u;
 
-// The smooth noise that a map is made with.
+// Smooth noise of the map, by `weather.noise`.
 fn smooth_fbm(p: vec3f, period: u32, octaves: u32, salt: u32) -> f32 {
     if WEATHER_NOISE == NOISE_WORLEY_SIMPLEX {
         return simplex_fbm(p.xy, period, octaves, salt);
@@ -18,23 +18,24 @@ fn smooth_fbm(p: vec3f, period: u32, octaves: u32, salt: u32) -> f32 {
     return perlin_fbm(p, period, octaves, salt);
 }
 
-// Three octaves of Worley noise.
+// FBM of three octaves of Worley noise.
 fn worley_fbm(p: vec3f, period: u32, salt: u32) -> f32 {
     return fbm3(vec3f(worley(p, period, salt), worley(p, period * 2u, salt + 1u), worley(p, period * 4u, salt + 2u)));
 }
 
-// Where clouds stand, before it is spread over 0 to 1; and what becomes 0 and 1, so that all noises cover alike.
+// Cover noise (x) and the values that map to coverages of 0 and 1 (y, z), chosen so that all noises give the same
+// cover.
 fn cover(p: vec3f, cells: u32, seed: u32) -> vec3f {
     let shape = smooth_fbm(p, cells, 4u, seed + 2u);
     if WEATHER_NOISE == NOISE_WORLEY_SIMPLEX {
-        // Clouds stand where simplex noise is high, and are cut by the borders of Worley's cells.
+        // Clouds stand where simplex noise is high; the borders of Worley cells cut them.
         return vec3f(worley_fbm(p, cells, seed) * (0.2 + 1.6 * shape), 0.2, 0.75);
     }
     if WEATHER_NOISE == NOISE_PERLIN_WORLEY {
         let blobs = remap01(worley_fbm(p, cells, seed), 0.1, 0.65);
         return vec3f(perlin_worley(shape, blobs), -0.05, 0.6);
     }
-    // Clouds stand where Worley's blobs are, and lean on a Perlin noise so that no two are alike.
+    // Clouds stand at the blobs of Worley noise. Perlin noise modulates them, so that no two are alike.
     let blobs = worley(p, cells, seed) * 0.6 + worley(p, cells * 2u, seed + 1u) * 0.4;
     return vec3f(0.9 * blobs + 0.7 * (shape - 0.5), 0.2, 0.7);
 }
@@ -61,7 +62,7 @@ fn weather(@builtin(global_invocation_id) id: vec3u) {
     textureStore(map_out, id.xy, vec4f(coverage, kind, rain, 1.0));
 }
 
-// The weighted sum of up to four maps, each as large as the march would read it: what is small is magnified.
+// Weighted sum of up to four maps at the largest size, read with the filter of the march: smaller maps are magnified.
 @compute @workgroup_size(8, 8)
 fn weather_mix(@builtin(global_invocation_id) id: vec3u) {
     let size = textureDimensions(map_out);

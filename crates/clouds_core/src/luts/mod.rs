@@ -77,8 +77,8 @@ impl Luts {
         self.weather.update(rec, inputs)?; // on a new weather or mixture
         self.large_scale_weather.update(rec, inputs)?; // on a new large-scale map or weights
         self.profile.update(rec, inputs)?; // on a new table
-        self.phase.update(rec, inputs)?; // on a new droplet diameter
-        self.high_clouds.update(rec, inputs)?; // as its octaves evolve
+        self.phase.update(rec, inputs)?; // once for a droplet
+        self.high_clouds.update(rec, inputs)?; // as they evolve
         self.transmittance.update(rec, inputs)?; // on a new atmosphere
         self.multiscatter.update(rec, inputs)?; // on a new atmosphere or ground
         self.sky.update(rec, inputs)?; // on a new sun or atmosphere, or a step of the eye

@@ -9,7 +9,7 @@ use crate::gpu::Recorder;
 use crate::gpu::{Bindings, Name};
 use crate::uniforms::Dispatch;
 
-/// Most turns of a dispatch: with the loops inside one, lavapipe's limit of 65,535 over a shader is far (hazard 21).
+/// Most turns of a dispatch: with the loops inside one, lavapipe's limit of 65,535 over a shader is far (docs/numerics.md).
 const MOST_TURNS: u32 = 2048;
 /// What a dispatch should take, in seconds.
 const SECONDS: f64 = 0.1;

@@ -53,7 +53,8 @@ class Job(NamedTuple):
 def count(jobs: Sequence[Job], size: Size) -> list[Counts]:
     """Per-pixel counts of each job."""
     for job in jobs:
-        if job.params.volume is not None or job.params.light.model == "path":
+        traced = "path" in (job.quality.integrator, job.params.light.model)
+        if job.params.volume is not None or traced or job.quality.integrator != "march":
             raise ValueError("only the march through procedural clouds is counted")
     with tempfile.TemporaryDirectory() as folder:
         counting_shaders(Path(folder))

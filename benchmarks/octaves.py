@@ -104,11 +104,10 @@ def cases(samples: int) -> list[Case]:
                         "atmosphere.enabled": False,
                         "high_clouds.coverage": 0.0,
                         "light.g": g,
-                        "light.model": "path",
                     }
                 )
             )
-            traced = nubis.quality("balanced").replace(path_samples=samples)
+            traced = nubis.quality("balanced").replace(integrator="path", path_samples=samples)
             layers = nubis.Renderer(*SIZE, quality=traced).render_layers(camera, params)
             cloudy = tiles(layers["transmittance"]) < np.exp(-0.5)
             truth = tiles(layers["radiance"][..., 0])

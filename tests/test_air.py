@@ -149,7 +149,13 @@ def test_night_falls(renderer):
 def test_tables_are_made_when_their_inputs_change():
     make = nubis.Renderer(16, 9)
     camera = looking((0.0, 1.0, 0.2), fov=60.0)
-    bakes = {"transmittance_bake", "first_order", "sum_orders", "sky_view_bake", "aerial_perspective_bake"}
+    bakes = {
+        "transmittance_bake",
+        "first_order",
+        "sum_orders",
+        "sky_view_bake",
+        "aerial_perspective_bake",
+    }
     air = bakes - {"sky_view_bake", "aerial_perspective_bake"}
 
     def baked(**changes):

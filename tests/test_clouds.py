@@ -316,7 +316,9 @@ def test_decks_in_pictures(renderer):
 
 
 def coverage_at(points, params):
-    expression = "vec4f(weather_texel(frame.sky.weather_origin, x.xy, large_scale_weather(x.xy)), 0.0)"
+    expression = (
+        "vec4f(weather_texel(frame.sky.weather_origin, x.xy, large_scale_weather(x.xy)), 0.0)"
+    )
     padded = np.hstack([points, np.zeros((len(points), 2))])
     return probe(expression, padded, imports=["density"], params=params)[:, 0].astype(np.float64)
 

@@ -128,7 +128,9 @@ def test_fit_of_droplets(diameter, peak):
     v = sphere()
     params = droplets("droplet", diameter)
     got = cloud_phase(v, params, f"droplet_fit(x.x, {peak})")
-    np.testing.assert_allclose(got, ref64.droplet(1 - v.astype(np.longdouble), diameter, peak), 2e-4)
+    np.testing.assert_allclose(
+        got, ref64.droplet(1 - v.astype(np.longdouble), diameter, peak), 2e-4
+    )
     if peak == 1:
         np.testing.assert_array_equal(cloud_phase(v, params), got)
     if peak == 0:

@@ -105,8 +105,9 @@ def checked(layers, params, quality):
     assert transmittance.min() >= 0 and transmittance.max() <= 1
     assert not np.isnan(depth).any() and depth.min() > 0
     assert np.isfinite(depth[transmittance < 1]).all()
-    converged = quality.tolerance > 0 or params.light.model == "path"
-    if params.light.model != "path" and not converged:
+    traced = "path" in (quality.integrator, params.light.model)
+    converged = traced or quality.integrator == "reference"
+    if not converged:
         steps = 2 * max(quality.steps_zenith, quality.steps_horizon)
         # A full sample, a cheap one, and where it is lit one more and those toward the sun.
         assert layers["samples"].max() <= steps * (4 + quality.light_steps)
@@ -417,7 +418,8 @@ def test_any_animation(data):
         assert np.isfinite(frame).all() and frame.min() >= 0
         assert frame[..., 3].max() <= 1
     # A static shot goes on tracing paths.
-    assert params.light.model == "path" or frame.tobytes() == still.tobytes()
+    traced = "path" in (quality.integrator, params.light.model)
+    assert traced or frame.tobytes() == still.tobytes()
 
 
 def moved(camera, eye):

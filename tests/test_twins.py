@@ -106,7 +106,9 @@ def test_simplex_noise_is_like_perlin_noise(rng):
     edge[:, 1] = rng.uniform(0, 1, 1000)
     for side in (edge, edge[:, ::-1]):
         across = (side == 0) * e
-        step = ref64_noise.simplex(1 + side - across, 5, 9) - ref64_noise.simplex(across + side, 5, 9)
+        step = ref64_noise.simplex(1 + side - across, 5, 9) - ref64_noise.simplex(
+            across + side, 5, 9
+        )
         assert np.abs(step).max() < 1e-4
 
 

@@ -298,9 +298,9 @@ class Renderer:
             - ``samples`` uint32 (height, width): number of density evaluations, of view and light
               samples together.
             - ``sky`` float32 (height, width, 3): radiance of the sky without clouds.
-            - ``standard_error`` float32 (height, width, 3), with light model ``"path"``: standard
+            - ``standard_error`` float32 (height, width, 3), with integrator ``"path"``: standard
               error of the radiance of the clouds, without the air in front of them.
-            - ``change`` float32 (height, width, 3), with quality ``"reference"``: change of that
+            - ``change`` float32 (height, width, 3), with integrator ``"reference"``: change of that
               radiance by the last halving of the steps.
 
         Raises
@@ -330,7 +330,8 @@ class Renderer:
             "sky": np.ascontiguousarray(sky[..., :3]),
         }
         if uncertainty is not None:
-            name = "standard_error" if params.light.model == "path" else "change"
+            traced = "path" in (self._quality.integrator, params.light.model)
+            name = "standard_error" if traced else "change"
             layers[name] = np.ascontiguousarray(uncertainty[..., :3])
         return layers
 
@@ -352,7 +353,7 @@ class Renderer:
         frame marches one pixel in sixty-four and reprojects one in sixteen. Its frames are
         upsampled from these pixels, as its stills are, so that a static shot equals the still.
 
-        With light model ``"path"`` or quality ``"reference"`` every frame is a still. A static shot
+        With integrator ``"path"`` or ``"reference"`` every frame is a still. A static shot
         accumulates paths: noise decreases from frame to frame.
 
         A change of wind between two shots does not make the clouds jump: the motion continues from
@@ -432,7 +433,7 @@ class Renderer:
         interpolated pixel of this frame, such as a disoccluded one. If one pixel in sixteen is
         reprojected (``contrast=1``), all sixteen pixels of a block have the value of the first,
         which grows by 4 per frame. None if nothing is reprojected: before the first frame, without
-        clouds, with quality ``"reference"`` and with light model ``"path"``.
+        clouds, and with the integrators ``"reference"`` and ``"path"``.
         """
         return self._core.history_length()
 
@@ -626,6 +627,12 @@ def _check_camera(camera: Any) -> None:
 def _check_params(params: Any) -> None:
     if not isinstance(params, Params):
         raise ParameterError(f"params = {params!r} is not allowed: it must be a nubis.Params")
+    if params.light.model == "path":
+        warnings.warn(
+            "light.model = 'path' is deprecated: use nubis.Quality(integrator='path')",
+            DeprecationWarning,
+            stacklevel=3,
+        )
 
 
 def _size(name: str, value: Any) -> int:

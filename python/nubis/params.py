@@ -608,6 +608,11 @@ class Quality(Block):
 
     Attributes
     ----------
+    integrator : {march, reference, path}
+        Integrator: `march`, the ray march that all settings but the last four belong to;
+        `reference`, the ray march whose steps are halved until it converges to `tolerance`; `path`,
+        path tracing of every order of scattering with the light model `octaves`. Allowed: one of
+        "march", "reference", "path".
     steps_zenith : int
         Number of view steps of a ray toward the zenith. Allowed: a whole number from 1 to 4096.
     steps_horizon : int
@@ -666,17 +671,21 @@ class Quality(Block):
         Whether the start of each ray is jittered by blue noise of up to one view step. Allowed:
         True or False.
     tolerance : float
-        Tolerance of the reference integrator: the steps are halved until no pixel changes by more
-        than this relative amount. Above 0 the reference integrator replaces the march with all of
-        its settings, and sun rays reach to the end of the clouds. 0 selects the march. Allowed: a
-        number from 0 to 1.
+        Tolerance of the integrator `reference`: the steps are halved until no pixel changes by more
+        than this relative amount. Its sun rays reach to the end of the clouds. Allowed: a number
+        from 0.000001 to 1.
     path_samples : int
-        Number of paths per pixel (light model `path`). Allowed: a whole number from 2 to 1048576.
+        Number of paths per pixel of the integrator `path`. Allowed: a whole number from 2 to
+        1048576.
     path_scatterings : int
-        Maximum number of scattering events of a path (light model `path`); 1 is single scattering.
-        Allowed: a whole number from 1 to 1048576.
+        Maximum number of scattering events of a path of the integrator `path`; 1 is single
+        scattering. Allowed: a whole number from 1 to 1048576.
+    seed : int
+        Seed of the random numbers of the integrator `path`. Allowed: a whole number from 0 to
+        4294967295.
     """
 
+    integrator: Literal["march", "reference", "path"] = "march"
     steps_zenith: int = 134
     steps_horizon: int = 320
     step_growth: float = 1.0
@@ -692,9 +701,10 @@ class Quality(Block):
     min_transmittance: float = 0.01
     contrast: float = 0.3
     jitter: bool = True
-    tolerance: float = 0.0
+    tolerance: float = 0.001
     path_samples: int = 64
     path_scatterings: int = 4096
+    seed: int = 0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

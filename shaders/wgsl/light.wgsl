@@ -191,7 +191,7 @@ fn seen_scattering(depth: f32, precipitation: f32, turned: Turn) -> f32 {
         return params.light.albedo * turned.phase * exp(-depth);
     }
     // The high clouds have no thickness and use octaves with the path tracer, too.
-    if MODEL == MODEL_OCTAVES || MODEL == MODEL_PATH {
+    if MODEL == MODEL_OCTAVES {
         return params.light.albedo * octaves(depth, turned);
     }
     // The artistic models scale the optical depth down, and up again in rain (nubis2015's p).

@@ -76,6 +76,18 @@ choice! {
 }
 
 choice! {
+    /// Integrator of the radiative transfer equation in the clouds.
+    Integrator {
+        /// Ray march with the step counts of the quality.
+        March = "march",
+        /// Ray march whose steps are halved until no pixel changes by more than `tolerance`.
+        Reference = "reference",
+        /// Path tracing of every order of scattering, unbiased and with noise.
+        Path = "path",
+    }
+}
+
+choice! {
     /// Phase function of the cloud droplets.
     Phase {
         /// Henyey-Greenstein with `g` (and `g_back` in thesis2018 and vsu2022), as in the published models.
@@ -420,6 +432,10 @@ params! {
 
     /// The numerical method: accuracy and cost of a picture. The appearance of the sky is set by `Params` alone.
     Quality {
+        /// Integrator: `march`, the ray march that all settings but the last four belong to; `reference`, the ray march
+        /// whose steps are halved until it converges to `tolerance`; `path`, path tracing of every order of scattering
+        /// with the light model `octaves`.
+        integrator: Integrator = Integrator::March;
         /// Number of view steps of a ray toward the zenith.
         steps_zenith: u32 = 134, in 1..=4096 "";
         /// Number of view steps of a ray toward the horizon.
@@ -467,14 +483,15 @@ params! {
         contrast: f32 = 0.3, in 0..=1 "";
         /// Whether the start of each ray is jittered by blue noise of up to one view step.
         jitter: bool = true;
-        /// Tolerance of the reference integrator: the steps are halved until no pixel changes by more than this
-        /// relative amount. Above 0 the reference integrator replaces the march with all of its settings, and sun
-        /// rays reach to the end of the clouds. 0 selects the march.
-        tolerance: f32 = 0.0, in 0..=1 "";
-        /// Number of paths per pixel (light model `path`).
+        /// Tolerance of the integrator `reference`: the steps are halved until no pixel changes by more than this
+        /// relative amount. Its sun rays reach to the end of the clouds.
+        tolerance: f32 = 0.001, in 0.000001..=1 "";
+        /// Number of paths per pixel of the integrator `path`.
         path_samples: u32 = 64, in 2..=1048576 "";
-        /// Maximum number of scattering events of a path (light model `path`); 1 is single scattering.
+        /// Maximum number of scattering events of a path of the integrator `path`; 1 is single scattering.
         path_scatterings: u32 = 4096, in 1..=1048576 "";
+        /// Seed of the random numbers of the integrator `path`.
+        seed: u32 = 0, in 0..=4294967295.0 "";
     }
 }
 
@@ -868,7 +885,7 @@ impl Quality {
                 path_samples: 256,
                 ..balanced
             },
-            "reference" => Self { tolerance: 1e-3, path_samples: 1024, ..balanced },
+            "reference" => Self { integrator: Integrator::Reference, path_samples: 1024, ..balanced },
             // "A sample and five more in a cone"; the sixth is the far one.
             "nubis2015" => published,
             // Options A to D of the text: big steps of three, ten empty samples, light samples always full.
@@ -897,9 +914,24 @@ impl Quality {
         2 * steps + groups * (1 + self.light_steps)
     }
 
+    /// The integrator of a sky: the light model `path` is a deprecated alias of the integrator `path`.
+    pub fn integrator_of(&self, params: &Params) -> Integrator {
+        if params.light.model == Model::Path { Integrator::Path } else { self.integrator }
+    }
+
+    /// Checks that the integrator has the light model of a sky.
+    pub(crate) fn check_model(&self, params: &Params) -> Result<()> {
+        let model = params.light.model;
+        if self.integrator != Integrator::Path || matches!(model, Model::Octaves | Model::Path) {
+            return Ok(());
+        }
+        let allowed = "'octaves' with quality.integrator = 'path', which traces every order of scattering";
+        Err(Error::parameter("light.model", model.to_value(), allowed))
+    }
+
     /// Whether a grid is read in f32 instead of by half-float hardware filtering.
     pub(crate) fn is_precise(&self, params: &Params) -> bool {
-        self.tolerance > 0.0 || params.light.model == Model::Path
+        self.integrator_of(params) != Integrator::March
     }
 
     /// Maximum number of rays through a pixel that is wider than clouds (subrays.wgsl): 16, the mean of which is off

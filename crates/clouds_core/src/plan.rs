@@ -7,34 +7,15 @@ use crate::frame::Frame;
 use crate::gpu::Specialization;
 use crate::grid::TILE;
 use crate::luts::Inputs;
-use crate::params::{Model, Params, Quality};
+use crate::params::{Integrator, Params, Quality};
 use crate::passes::display::Screen;
 use crate::passes::{composite, refine};
 use crate::shot::Shot;
 use crate::specialization;
 
-/// How the clouds of a picture are computed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Integrator {
-    /// By so many steps.
-    March,
-    /// By steps that are halved until nothing changes.
-    Reference,
-    /// By tracing paths.
-    Path,
-}
-
 impl Integrator {
-    pub fn new(params: &Params, quality: &Quality) -> Self {
-        match params.light.model {
-            Model::Path => Self::Path,
-            _ if quality.tolerance > 0.0 => Self::Reference,
-            _ => Self::March,
-        }
-    }
-
-    /// Whether there is nothing to march.
-    pub fn is_cloudless(self, params: &Params) -> bool {
+    /// Whether a sky has no clouds to march.
+    pub(crate) fn is_cloudless(self, params: &Params) -> bool {
         self == Self::March && !params.has_clouds()
     }
 }
@@ -81,7 +62,7 @@ pub(crate) struct Plan {
 impl Plan {
     /// The plan of a picture for a target, which completes its `frame`. Frames of an animation have one strip.
     pub fn new(frame: &mut Frame, params: &Params, quality: &Quality, target: Target<'_>) -> Self {
-        let integrator = Integrator::new(params, quality);
+        let integrator = quality.integrator_of(params);
         let march = integrator == Integrator::March;
         frame.cloudless = integrator.is_cloudless(params);
         frame.grid.low_resolution = march && refine::is_low_resolution(frame, quality);

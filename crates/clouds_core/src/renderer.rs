@@ -12,11 +12,11 @@ use crate::gpu::{Gpu, Interrupt, Timings, check_fork};
 use crate::grid;
 use crate::history::{Accumulator, Past, upload_scenes};
 use crate::luts::Luts;
-use crate::params::{Model, Quality};
+use crate::params::{Integrator, Quality};
 use crate::passes::display::{self, Screen};
 use crate::passes::{composite, march, path, reference, reproject};
 use crate::picture::{Picture, download};
-use crate::plan::{Integrator, Plan, Target};
+use crate::plan::{Plan, Target};
 use crate::scene_depth::SceneTextures;
 use crate::shot::{Shot, check_size};
 use crate::targets::{Targets, count};
@@ -193,7 +193,7 @@ impl Renderer {
         let cut = self.past.as_ref().is_some_and(|past| past.is_cut(shot));
         let params = &self.going.on(shot.params, shot.time, cut);
         let shot = &shot.of(params);
-        if Integrator::new(params, &self.quality) == Integrator::March {
+        if self.quality.integrator_of(params) == Integrator::March {
             self.check_pixels(shot)?;
             return Ok(self.frame(shot, Target::Animation(screen), interrupt)?.image);
         }
@@ -219,7 +219,7 @@ impl Renderer {
         let last = self.accumulator.take().filter(|last| last.is_of(shot));
         let mut mean = last.unwrap_or_else(|| Accumulator::new(shot));
         // What has converged stays.
-        if mean.count == 0 || shot.params.light.model == Model::Path {
+        if mean.count == 0 || self.quality.integrator_of(shot.params) == Integrator::Path {
             let first_sample = mean.count.wrapping_mul(self.quality.path_samples);
             mean.add(self.frame(shot, Target::Still { layers: false, first_sample }, interrupt)?.image);
         }

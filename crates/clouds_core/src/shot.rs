@@ -45,6 +45,7 @@ impl<'a> Shot<'a> {
     pub(crate) fn checked(&self, size: [u32; 2], quality: &Quality) -> Result<(Frame, Params)> {
         check_fork()?;
         self.params.check()?;
+        quality.check_model(self.params)?;
         if !self.time.is_finite() {
             return Err(Error::parameter("time", self.time, "a finite number of seconds"));
         }

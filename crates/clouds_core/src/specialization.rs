@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::frame::Frame;
 use crate::gpu::Specialization;
-use crate::params::{Params, Quality, WeatherNoise};
+use crate::params::{Model, Params, Quality, WeatherNoise};
 
 /// The table of a picture. `layers`: the sky and the depth are asked for too.
 pub(crate) fn of_picture(params: &Params, quality: &Quality, frame: &Frame, layers: bool) -> Arc<Specialization> {
@@ -42,10 +42,12 @@ pub(crate) fn of_bakes() -> Arc<Specialization> {
 fn of_sky(params: &Params, quality: &Quality) -> Specialization {
     let on = |on: bool| f64::from(u8::from(on));
     let light = &params.light;
+    // High clouds have no thickness to trace paths through.
+    let model = if light.model == Model::Path { Model::Octaves } else { light.model };
     let volume = params.volume.is_some();
     let cheap = quality.cheap_light < 1.0 || quality.far_sample || quality.light_distance <= 0.0;
     Specialization::new([
-        ("MODEL", f64::from(light.model as u32)),
+        ("MODEL", f64::from(model as u32)),
         ("PHASE", f64::from(light.phase as u32)),
         ("VOLUME", on(volume)),
         ("PRECISE", on(quality.is_precise(params))),

@@ -4,13 +4,14 @@ use crate::frame::Frame;
 use crate::gpu::Bindings;
 use crate::gpu::Gpu;
 use crate::grid::SampleGrid;
+use crate::params::Integrator;
 use crate::passes::clouds::CloudBuffers;
 use crate::passes::composite::{Background, Output, Parts};
 use crate::passes::rays::Rays;
 use crate::passes::refine::RayList;
 use crate::passes::reproject::{self, Current, HistoryBuffers};
 use crate::passes::{path, reference};
-use crate::plan::{Integrator, Plan};
+use crate::plan::Plan;
 use crate::scene_depth::SceneTextures;
 
 /// Buffers of the strips of a still, or of the frames of an animation.

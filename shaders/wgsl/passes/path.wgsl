@@ -50,7 +50,7 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
             var view = middle;
             if SUBRAYS {
                 let number = pixel.y * frame.view.width + pixel.x;
-                let place = random3(vec3u(number, frame.view.first_sample + ray.done, 0u), 0u).xy;
+                let place = random3(vec3u(number, frame.view.first_sample + ray.done, 0u), params.quality.seed).xy;
                 view = vec4f(view_direction(ray_place(pixel, place, rays)).xyz, middle.w);
             }
             ray.direction = view.xyz;
@@ -143,7 +143,7 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
 fn draw(ray: ptr<function, PathRay>, pixel: vec2u) -> vec3f {
     (*ray).random_dimension += 1u;
     let number = pixel.y * frame.view.width + pixel.x;
-    return random3(vec3u(number, frame.view.first_sample + (*ray).done, (*ray).random_dimension), 0u);
+    return random3(vec3u(number, frame.view.first_sample + (*ray).done, (*ray).random_dimension), params.quality.seed);
 }
 
 fn sun_at(p: vec3f) -> vec3f {

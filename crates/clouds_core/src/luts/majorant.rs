@@ -5,7 +5,7 @@ use super::volume::Grid;
 use super::weather;
 use crate::error::Result;
 use crate::gpu::Recorder;
-use crate::params::{self, BroadShares, Edge, Model};
+use crate::params::{self, BroadShares, Edge, Integrator};
 use crate::shared::constants;
 
 constants! {
@@ -32,7 +32,7 @@ pub(crate) struct Majorants {
 impl Majorants {
     pub fn update(&mut self, rec: &mut Recorder<'_>, inputs: &Inputs<'_>) -> Result<()> {
         let params = inputs.params;
-        if params.light.model != Model::Path {
+        if inputs.quality.integrator_of(params) != Integrator::Path {
             return Ok(());
         }
         let grid = Grid(params.volume.clone());

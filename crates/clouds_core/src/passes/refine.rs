@@ -7,7 +7,7 @@ use crate::gpu::Bindings;
 use crate::gpu::Gpu;
 use crate::gpu::{List, Recorder};
 use crate::grid::{TILE, WIDEST};
-use crate::params::Quality;
+use crate::params::{Integrator, Quality};
 
 /// Whether the pixels of that lattice are all that is ever marched: where no contrast is too large to interpolate, and no scene of the
 /// user's has edges. The rest of the picture is interpolated where it is composed (composite.wgsl), cell by cell.
@@ -19,7 +19,7 @@ impl Quality {
     /// Whether one in sixteen is all that is marched of a picture of so many pixels, and that an animation follows: with a `contrast` of 1,
     /// where pixels are less than an eighth of a degree wide. A scene of the user's has all its pixels.
     pub fn is_low_resolution(&self, camera: &Camera, size: [u32; 2]) -> bool {
-        self.tolerance == 0.0 && is_low_resolution(&Frame::seen_by(camera, size), self)
+        self.integrator == Integrator::March && is_low_resolution(&Frame::seen_by(camera, size), self)
     }
 }
 

@@ -6,8 +6,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-import ref64_air
 import nubis
+import ref64_air
 from nubis import DensityGrid
 from nubis.testing import probe
 
@@ -149,14 +149,8 @@ def test_night_falls(renderer):
 def test_tables_are_made_when_their_inputs_change():
     make = nubis.Renderer(16, 9)
     camera = looking((0.0, 1.0, 0.2), fov=60.0)
-    bakes = {
-        "transmittance_bake",
-        "first_order",
-        "sum_orders",
-        "sky_view_bake",
-        "aerial_perspective_bake",
-    }
-    air = bakes - {"sky_view_bake", "aerial_perspective_bake"}
+    air = {"transmittance_bake", "first_order", "sum_orders"}
+    bakes = air | {"sky_view_bake", "aerial_perspective_bake"}
 
     def baked(**changes):
         make.render(camera, clear(**changes))

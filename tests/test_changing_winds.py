@@ -9,9 +9,9 @@ import re
 import numpy as np
 import pytest
 
-import ref64_noise
 import nubis
 import ref64
+import ref64_noise
 from nubis import Keyframes, ParameterError, Params, _nubis
 from test_wind import TILE, alike, moved, points_of, rms
 

@@ -9,8 +9,8 @@ import pytest
 
 import nubis
 import ref64
-from ref64_noise import gradients, height_profile
 from nubis.testing import probe
+from ref64_noise import gradients, height_profile
 
 
 def even(kind, **changes):

@@ -9,8 +9,8 @@ import pytest
 
 import nubis
 import ref64
-from ref64_noise import base_shape, eroded, gradients, height_profile, with_coverage
 from nubis.testing import probe
+from ref64_noise import base_shape, eroded, gradients, height_profile, with_coverage
 
 UNIT = np.linspace(0, 1, 11)
 

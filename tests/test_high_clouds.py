@@ -6,9 +6,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-import ref64_noise
 import nubis
 import ref64
+import ref64_noise
 from test_twins import texels
 
 ALONE = {"clouds.coverage": 0.0, "sun.visible": False, "atmosphere.enabled": False}

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-import ref64_noise
 import nubis
 import ref64
+import ref64_noise
 from nubis.testing import probe
 
 SPOT, RADIUS = (3000.0, -2000.0), 4000.0

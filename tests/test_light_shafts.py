@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-import ref64_air
 import nubis
 import ref64
+import ref64_air
 
 SIZE = 160, 90
 #: Pixels that are compared with the ref64.

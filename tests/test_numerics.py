@@ -5,8 +5,8 @@ import pytest
 
 import nubis
 import ref64
-from ref64_noise import f32, random3
 from nubis.testing import probe
+from ref64_noise import f32, random3
 
 EARTH = 6_371_000.0
 

@@ -33,10 +33,9 @@ for picture in {pictures}:
 STILLS = "(renderer.render(camera, params) for _ in range(5))"
 FRAMES = "renderer.animate((camera, params, i / 24) for i in range(20))"
 
-# So small that the device learns nothing of their kernels (`MIN_TIMED_INVOCATIONS` in gpu/recorder.rs): what is thought of
-# those comes to a fifth of a slice, whatever else the machine does. So narrow that rays are a
-# lattice, as those of larger pictures are; up to a million pixels (`STRIP_PIXELS` in plan.rs) these
-# are recorded alike.
+# Dispatches too small to be timed (`MIN_TIMED_INVOCATIONS` in gpu/recorder.rs): estimates come
+# to a fifth of a slice, whatever else the machine does. Pixels narrow enough for adaptive sampling,
+# as in larger pictures; up to a million pixels (`STRIP_PIXELS` in plan.rs) all are alike.
 SMALL = {"size": "32, 24", "fov": 2.0}
 # Under load, work is thought of as longer, and may be cut into more slices.
 LARGE = {"size": "480, 270", "fov": 60.0}

@@ -7,9 +7,9 @@ import itertools
 import numpy as np
 import pytest
 
-import ref64_noise
 import nubis
 import ref64
+import ref64_noise
 from nubis.testing import probe
 
 NOISES = ["nubis2015", "vsu2022"]

@@ -9,9 +9,9 @@ import zlib
 import numpy as np
 import pytest
 
-import ref64_noise
 import nubis
 import ref64
+import ref64_noise
 from nubis import FileError, ParameterError, Params, Weather, WeatherBlend
 from nubis.testing import probe
 

@@ -5,9 +5,9 @@ their wandering the integral of what `ref64_noise` says their velocity is.
 import numpy as np
 import pytest
 
-import ref64_noise
 import nubis
 import ref64
+import ref64_noise
 from nubis.testing import probe
 
 MONTH = 2.6e6  # s

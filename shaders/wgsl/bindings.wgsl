@@ -5,7 +5,6 @@
 
 // Specialization: a pipeline is compiled for these values, without the code that they switch off
 // (crates/clouds_core/src/specialization.rs).
-override MODEL: u32 = 0u; // light.model
 override PHASE: u32 = 0u; // light.phase
 override VOLUME: bool = false; // clouds from the user's grid instead of procedural ones
 override KEEP_CLEAR: bool = false; // a region kept clear of clouds

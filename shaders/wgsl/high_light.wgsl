@@ -54,7 +54,7 @@ fn high_layer(direction: vec3f, distance: f32, visible: bool, turned: Turn) -> L
         sun *= 1.0 + params.high_clouds.emboss * EMBOSS_GAIN * high.relief / (abs(high.relief) + EMBOSS_HALF);
     }
     var radiance = sun;
-    if MODEL != MODEL_SINGLE {
+    if AMBIENT {
         // Overcast is grey: seen from below, only the transmitted part of the light from above reaches the eye.
         let through = select(1.0, 1.0 / (1.0 + HIGH_ALBEDO * optical_depth), cosine > 0.0);
         // The ground below receives the light that high clouds and lower clouds transmit.

@@ -1,8 +1,9 @@
-// Light models: radiance that clouds scatter toward the eye from sunlight and skylight, for each published model as its
-// source defines it.
+// Radiance that clouds scatter toward the eye from sunlight and skylight. `light_model` stands for the file of the light
+// model in light_models/: `lobe_phase`, `seen_scattering`, `slowest_extinction` and `AMBIENT` are the model's.
 #import math
 #import phase
 #import droplets
+#import light_model
 #import shell
 #import density
 #import ambient
@@ -140,25 +141,7 @@ fn model_phase(one_minus_mu: f32) -> f32 {
     if PHASE != PHASE_HENYEY_GREENSTEIN {
         return droplet_phase(one_minus_mu);
     }
-    let forward = henyey_greenstein(one_minus_mu, params.light.g);
-    let backward = henyey_greenstein(one_minus_mu, params.light.g_back);
-    switch MODEL {
-        case MODEL_THESIS2018: {
-            return max(forward, backward);
-        }
-        case MODEL_VSU2022: {
-            return mix(backward, forward, params.light.lobe_mix);
-        }
-        default: {
-            return forward;
-        }
-    }
-}
-
-// Scattering angle of sunlight toward the eye, as 1 minus its cosine, and the phase function, averaged over a pixel.
-struct Turn {
-    one_minus_mu: f32,
-    phase: f32,
+    return lobe_phase(one_minus_mu);
 }
 
 // Scattering angle at a pixel, given by its corner.
@@ -185,59 +168,10 @@ fn sun_scattering(depth: f32, precipitation: f32, one_minus_mu: f32) -> f32 {
     return seen_scattering(depth, precipitation, Turn(one_minus_mu, model_phase(one_minus_mu)));
 }
 
-// Radiance per unit of irradiance and optical depth, with the phase function of a pixel.
-fn seen_scattering(depth: f32, precipitation: f32, turned: Turn) -> f32 {
-    if MODEL == MODEL_SINGLE {
-        return params.light.albedo * turned.phase * exp(-depth);
-    }
-    // The high clouds have no thickness and use octaves with the path tracer, too.
-    if MODEL == MODEL_OCTAVES {
-        return params.light.albedo * octaves(depth, turned);
-    }
-    // The artistic models scale the optical depth down, and up again in rain (nubis2015's p).
-    let d = depth * params.light.absorption * mix(1.0, params.light.rain_absorption, precipitation);
-    let powder = 1.0 - params.light.powder * exp(-2.0 * d);
-    var beer = exp(-d);
-    if MODEL == MODEL_THESIS2018 {
-        beer = max(beer, 0.7 * exp(-0.5 * d));
-    }
-    return 2.0 * params.light.sun_gain * beer * powder * turned.phase;
-}
-
-// Multiple scattering as octaves of single scattering, each with less light, less extinction and less anisotropy
-// (Wrenninge et al. 2013, Hillaire 2016).
-fn octaves(depth: f32, turned: Turn) -> f32 {
-    var sum = 0.0;
-    var share = 1.0;
-    var d = depth;
-    var peak = 1.0;
-    for (var i = 0u; i < params.light.octaves; i++) {
-        var phase = turned.phase;
-        if i > 0u {
-            if PHASE == PHASE_HENYEY_GREENSTEIN {
-                phase = henyey_greenstein(turned.one_minus_mu, peak * params.light.g);
-            } else {
-                phase = droplet_fit(turned.one_minus_mu, peak);
-            }
-        }
-        sum += share * phase * exp(-d);
-        share *= params.light.octave_scattering;
-        d *= params.light.octave_extinction;
-        peak *= params.light.octave_phase;
-    }
-    return sum;
-}
-
 // Optical depth toward the sun beyond which `sun_scattering` is less than a millionth of its value at 0.
 fn dark_depth() -> f32 {
     const MILLIONTH = 14.0;
-    var slowest = 1.0;
-    if MODEL == MODEL_OCTAVES {
-        slowest = pow(params.light.octave_extinction, f32(params.light.octaves - 1u));
-    } else if MODEL != MODEL_SINGLE {
-        slowest = params.light.absorption * select(1.0, 0.5, MODEL == MODEL_THESIS2018);
-    }
-    return MILLIONTH / max(slowest, 1e-6);
+    return MILLIONTH / max(slowest_extinction(), 1e-6);
 }
 
 // Ambient radiance at a point: from the sky above and from below, each with the user's own ambient light.
@@ -291,7 +225,7 @@ fn gathered_radiance(sum: Gathered, nodes: AerialPoints, direction: vec3f) -> ve
         return radiance_through_air(sum, nodes, direction);
     }
     let sun = sum.sun.x * sky_light[2].rgb;
-    if MODEL == MODEL_SINGLE {
+    if !AMBIENT {
         return sun;
     }
     let below = sum.weight.x - sum.above.x;
@@ -315,7 +249,7 @@ fn radiance_through_air(sum: Gathered, nodes: AerialPoints, direction: vec3f) ->
         let h = altitude_at(p);
         let mu = cos_zenith_at(p, frame.sky.sun_direction);
         var light = sum.sun[k] * sun_irradiance(h, mu);
-        if MODEL != MODEL_SINGLE {
+        if AMBIENT {
             light += sum.above[k] * ambient_above(clouded_sky(light_from_above(h, mu)));
             light += (sum.weight[k] - sum.above[k]) * ambient_below(ground_share() * light_from_below(h, mu));
         }

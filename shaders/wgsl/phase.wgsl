@@ -1,6 +1,12 @@
 // Phase functions, 1/sr: each integrates to 1 over the sphere.
 #import math
 
+// Scattering angle of sunlight toward the eye, as 1 minus its cosine, and the phase function, averaged over a pixel.
+struct Turn {
+    one_minus_mu: f32,
+    phase: f32,
+}
+
 // Henyey and Greenstein 1941. `one_minus_mu` is 1 minus the cosine of the scattering angle, between the light's
 // direction of travel before and after. With it, and with 1 - g, the denominator keeps its digits: 1 + g^2 - 2 g mu is
 // off by 8 % in f32 at g = 0.999, and negative, which gives NaN, from g = 0.9997 (docs/numerics.md).

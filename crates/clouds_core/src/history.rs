@@ -1,4 +1,4 @@
-//! What is remembered of the frames before, and what counts as a cut.
+//! History of an animation: the previous frame, the conditions of a cut, and accumulation.
 
 use crate::camera::Camera;
 use crate::frame::Frame;
@@ -9,20 +9,20 @@ use crate::shot::Shot;
 use crate::targets::{Targets, Temporal};
 use crate::wind::Advection;
 
-/// The frame before.
+/// Previous frame of an animation.
 pub(crate) struct Past {
     pub camera: Camera,
     pub params: Params,
     pub time: f64,
     pub frame: Frame,
-    /// Distance of the user's scene.
+    /// Distance of the user's scene in m, by pixel.
     pub scene: Option<Vec<f32>>,
-    /// Frames since the last cut.
+    /// Number of frames since the last cut.
     pub index: u32,
 }
 
 impl Past {
-    /// Whether what was seen before says nothing about what is seen now.
+    /// Whether a shot is a cut: it differs from the previous frame by so much that the history is useless.
     pub fn is_cut(&self, shot: &Shot<'_>) -> bool {
         let Shot { camera, params: new, time, .. } = *shot;
         let old = &self.params;
@@ -35,61 +35,61 @@ impl Past {
             || (old.clouds.seed, old.clouds.noise) != (new.clouds.seed, new.clouds.noise)
             || (old.weather.extent, old.weather.edge) != (new.weather.extent, new.weather.edge)
             || old.weather.broad_extent != new.weather.broad_extent
-            || weather_change(old, new) > MOST_WEATHER_CHANGE
+            || weather_change(old, new) > MAX_WEATHER_CHANGE
             || old.volume != new.volume
             || (old.light.model, old.light.phase) != (new.light.model, new.light.phase)
             || old.atmosphere.planet_radius != new.atmosphere.planet_radius
     }
 
-    /// Whether the next frame may be reprojected from this one: there is no cut, clouds are marched in both or in neither,
-    /// and the size is the same where a scene of the user has edges.
+    /// Whether a frame can be reprojected from this one: it is no cut, clouds are marched in both frames or in neither,
+    /// and the size is the same if there is a user's scene, which may have edges.
     pub fn serves(&self, shot: &Shot<'_>, cloudless: bool, size: [u32; 2]) -> bool {
         let same_size = [self.frame.view.width, self.frame.view.height] == size;
         !self.is_cut(shot) && self.frame.cloudless == cloudless && (self.is_bare(shot.scene.is_some()) || same_size)
     }
 
-    /// Whether the edges of a scene are nowhere, then and now: only then may the frame before have had other pixels.
+    /// Whether neither frame has a user's scene. Only then may the sample grids differ: resampling would blur its edges.
     pub fn is_bare(&self, scene: bool) -> bool {
         self.scene.is_none() && !scene
     }
 }
 
-/// Largest share of the weather map that may change from one frame to the next without a cut: a third within the sixteen
-/// frames in which every pixel is marched anew. A change in thirty seconds (thesis2018) is that slow from two frames a
-/// second on.
-const MOST_WEATHER_CHANGE: f32 = 0.02;
+/// Maximum fraction of the weather map that may change between two frames without a cut: it amounts to a third within
+/// the sixteen frames in which every pixel is marched once. A change of weather within 30 s (thesis2018) stays below it
+/// at two frames per second or more.
+const MAX_WEATHER_CHANGE: f32 = 0.02;
 
-/// The share of the weather map that is another.
+/// Fraction of the weather map that differs between two skies: 1 minus the weights that they have in common.
 fn weather_change(old: &Params, new: &Params) -> f32 {
     let old = old.weather_shares();
-    let kept = |(weather, share): (params::Weather, f32)| {
+    let common = |(weather, share): (params::Weather, f32)| {
         old.iter().find(|(before, _)| *before == weather).map_or(0.0, |(_, before)| before.min(share))
     };
-    1.0 - new.weather_shares().into_iter().map(kept).sum::<f32>()
+    1.0 - new.weather_shares().into_iter().map(common).sum::<f32>()
 }
 
-/// A picture that every frame of a static shot makes better, where frames are not reprojected: the mean of stills.
+/// Accumulator of a static shot without reprojection: the mean of its stills.
 pub(crate) struct Accumulator {
     camera: Camera,
     params: Params,
     time: f64,
     background: bool,
-    /// Distance and radiance of the user's scene.
+    /// Distance in m and radiance of the user's scene, by pixel.
     scene: Option<(Vec<f32>, Option<Vec<f32>>)>,
     pub image: Vec<f32>,
-    /// Stills that it is the mean of.
+    /// Number of accumulated stills.
     pub count: u32,
 }
 
 impl Accumulator {
-    /// An empty one.
+    /// Empty accumulator for a shot.
     pub fn new(shot: &Shot<'_>) -> Self {
         let scene = shot.scene.map(|scene| (scene.distance.to_vec(), scene.color.map(<[f32]>::to_vec)));
         let (camera, params, time) = (*shot.camera, shot.params.clone(), shot.time);
         Self { camera, params, time, background: shot.background, scene, image: Vec::new(), count: 0 }
     }
 
-    /// Whether it is of a shot.
+    /// Whether its stills are of this shot.
     pub fn is_of(&self, shot: &Shot<'_>) -> bool {
         let seen = match (&self.scene, &shot.scene) {
             (Some((distance, color)), Some(SceneDepth { distance: now, color: lit })) => {
@@ -115,11 +115,17 @@ impl Accumulator {
 }
 
 impl Frame {
-    /// Notes what has changed since the frame before.
-    pub(crate) fn follow(&mut self, shot: &Shot<'_>, params: &Params, last: Option<&Past>, resized: Option<&Targets>) {
+    /// Sets the motion since the previous frame. `resized` has the buffers of a previous frame on another sample grid.
+    pub(crate) fn set_motion(
+        &mut self,
+        shot: &Shot<'_>,
+        params: &Params,
+        last: Option<&Past>,
+        resized: Option<&Targets>,
+    ) {
         let Some(last) = last else { return };
-        let carried = Advection::between((&last.params, last.time), (params, shot.time));
-        self.set_previous(&last.frame, shot.camera.eye - last.camera.eye, &carried);
+        let advection = Advection::between((&last.params, last.time), (params, shot.time));
+        self.set_previous(&last.frame, shot.camera.eye - last.camera.eye, &advection);
         let scene = shot.scene.map(|scene| scene.distance);
         let still = last.camera == *shot.camera && self.view.cloud_motion == [0.0; 3] && last.scene.as_deref() == scene;
         self.view.moving = u32::from(!still);
@@ -131,8 +137,8 @@ impl Frame {
     }
 }
 
-/// Uploads the scene of a strip and, in an animation, that of the previous frame. Where only one of the two has a scene,
-/// that of the other is infinitely far away.
+/// Uploads the user's scene of a strip and, in an animation, that of the previous frame. A frame without a scene has one
+/// at an infinite distance.
 pub(crate) fn upload_scenes(
     textures: &SceneTextures,
     temporal: Option<&mut Temporal>,
@@ -144,12 +150,12 @@ pub(crate) fn upload_scenes(
     let [first, pixels] =
         [frame.dispatch.strip_row, frame.dispatch.strip_rows].map(|rows| rows as usize * frame.view.width as usize);
     let strip = first..first + pixels;
-    let nothing = vec![f32::INFINITY; if temporal.is_some() { strip.end } else { 0 }];
-    textures.upload(gpu, &scene.unwrap_or(SceneDepth { distance: &nothing, color: None }), strip.clone());
+    let empty = vec![f32::INFINITY; if temporal.is_some() { strip.end } else { 0 }];
+    textures.upload(gpu, &scene.unwrap_or(SceneDepth { distance: &empty, color: None }), strip.clone());
     let Some(Temporal { scene_before, .. }) = temporal else { return };
     if !scene_before.holds(pixels as u64, false) {
         *scene_before = SceneTextures::new(gpu, pixels as u64, false);
     }
-    let distance = past.and_then(|past| past.scene.as_deref()).unwrap_or(&nothing);
+    let distance = past.and_then(|past| past.scene.as_deref()).unwrap_or(&empty);
     scene_before.upload(gpu, &SceneDepth { distance, color: None }, strip);
 }

@@ -1,27 +1,27 @@
-//! A picture that has come back from the device.
+//! Picture in memory, and its readback.
 
 use crate::frame::Frame;
 use crate::gpu::{Download, Recorder};
 use crate::grid::{SampleGrid, TILE};
 use crate::targets::{Targets, count};
 
-/// A picture, row by row.
+/// Layers of a picture, row by row from the top.
 #[derive(Clone, Debug, Default)]
 pub struct Picture {
-    /// Four numbers a pixel: radiance and alpha (see [`Renderer::render`]).
+    /// Radiance and alpha, four numbers per pixel ([`Renderer::render`](crate::Renderer::render)).
     pub image: Vec<f32>,
-    /// Four numbers a pixel: radiance of the sky without clouds, and 1.
+    /// Radiance of the background without clouds, and 1, four numbers per pixel.
     pub sky: Vec<f32>,
-    /// Metres to the mean scattering point, -1 where there is none.
+    /// Distance to the mean scattering point in m, -1 without clouds.
     pub depth: Vec<f32>,
-    /// Density evaluations, primary and light together.
+    /// Number of density evaluations, of view and light samples together.
     pub samples: Vec<u32>,
-    /// Four numbers a pixel: how sure the radiance of the clouds is, and 0. A standard error where paths are traced, the
-    /// change by the last halving where rays converge, nothing where they are marched.
+    /// Uncertainty of the radiance of the clouds, and 0, four numbers per pixel: the standard error of path tracing, or
+    /// the change by the last halving of the reference integrator's steps. Empty for marched pictures.
     pub uncertainty: Vec<f32>,
 }
 
-/// Brings a strip of a still back.
+/// Records the readback of a strip.
 pub(crate) fn download(rec: &mut Recorder<'_>, frame: &Frame, targets: &Targets, layers: bool) {
     let Targets { output, rays, .. } = targets;
     let pixels = count([frame.view.width, frame.dispatch.rows]);
@@ -38,7 +38,7 @@ pub(crate) fn download(rec: &mut Recorder<'_>, frame: &Frame, targets: &Targets,
 }
 
 impl Picture {
-    /// Adds a strip.
+    /// Appends the readback of a strip.
     pub(crate) fn append(&mut self, downloads: &[Download], frame: &Frame, layers: bool) {
         self.image.extend_from_slice(downloads[0].numbers());
         if !layers {
@@ -58,11 +58,11 @@ impl Picture {
     }
 }
 
-/// A number for each pixel of a picture at low resolution: that of its sample, or 0 where it has none.
+/// Value of each pixel of a grid at low resolution: that of its sample, or 0 between samples.
 fn at_pixels(numbers: &[u32], grid: SampleGrid) -> impl Iterator<Item = u32> {
     let [columns, _] = grid.samples();
     let [width, height] = grid.size;
-    let place = move |x: u32, y: u32| (y / TILE * columns + x / TILE) as usize;
+    let index = move |x: u32, y: u32| (y / TILE * columns + x / TILE) as usize;
     let sampled = |x: u32, y: u32| x.is_multiple_of(TILE) && y.is_multiple_of(TILE);
-    (0..height).flat_map(move |y| (0..width).map(move |x| if sampled(x, y) { numbers[place(x, y)] } else { 0 }))
+    (0..height).flat_map(move |y| (0..width).map(move |x| if sampled(x, y) { numbers[index(x, y)] } else { 0 }))
 }

@@ -1,4 +1,4 @@
-//! What a picture needs: which integrator, which pixels hold a sample, in which strips. It follows from the picture alone.
+//! Plan of a picture: integrator, sample grid, strips and specialization. It depends on shot, quality and target alone.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -14,53 +14,54 @@ use crate::shot::Shot;
 use crate::specialization;
 
 impl Integrator {
-    /// Whether a sky has no clouds to march.
+    /// Whether the march has no clouds in a sky. The other integrators trace every sky.
     pub(crate) fn is_cloudless(self, params: &Params) -> bool {
         self == Self::March && !params.has_clouds()
     }
 }
 
-/// What a frame is for.
+/// Target of a frame.
 #[derive(Clone, Copy)]
 pub(crate) enum Target<'a> {
-    /// A still, with its layers or without. The path of each pixel that is traced first has that number.
+    /// Still. `layers`: background, depth and statistics are outputs too. `first_sample`: index of the first path of each
+    /// pixel.
     Still { layers: bool, first_sample: u32 },
-    /// The next frame of an animation: onto a screen or, without one, to memory.
+    /// Next frame of an animation, to a screen or, without one, to memory.
     Animation(Option<&'a Screen>),
 }
 
 impl Target<'_> {
-    /// Whether the frame has a history.
+    /// Whether the target is an animation, whose frames have a history.
     pub fn is_animation(self) -> bool {
         matches!(self, Self::Animation(_))
     }
 
-    /// Whether the sky and the depth are asked for too.
+    /// Whether the layers besides the image are outputs.
     pub fn layers(self) -> bool {
         matches!(self, Self::Still { layers: true, .. })
     }
 }
 
-/// Most pixels of a strip, which is as much of a still as the device holds: 64 bytes each.
+/// Maximum number of pixels of a strip of a still: it limits the buffers, of 64 bytes per pixel.
 const STRIP_PIXELS: u32 = 1 << 20;
-/// Most rays that are on their way together where they take many dispatches.
+/// Maximum number of rays of a strip for integrators whose rays take many dispatches.
 const STRIP_RAYS: u32 = 1 << 14;
 
-/// What a picture needs.
+/// Plan of a picture.
 pub(crate) struct Plan {
     pub integrator: Integrator,
-    /// Whether what is behind the clouds is worked out by cells.
+    /// Whether the background is evaluated at the corners of cells and interpolated where it is smooth.
     pub by_cells: bool,
-    /// Whether pixels between marched ones are interpolated where they look alike (passes/refine).
+    /// Adaptive sampling: whether pixels between samples of low contrast are interpolated (passes/refine).
     adaptive: bool,
     height: u32,
-    /// Rows of each strip.
+    /// Range of rows of each strip.
     pub strips: Vec<Range<u32>>,
     pub specialization: Arc<Specialization>,
 }
 
 impl Plan {
-    /// The plan of a picture for a target, which completes its `frame`. Frames of an animation have one strip.
+    /// Plan of a picture for a target. Sets `cloudless` and the sample grid of `frame`. An animation has one strip.
     pub fn new(frame: &mut Frame, params: &Params, quality: &Quality, target: Target<'_>) -> Self {
         let integrator = quality.integrator_of(params);
         let march = integrator == Integrator::March;
@@ -83,7 +84,7 @@ impl Plan {
         }
     }
 
-    /// What its LUTs are made from, of a shot whose sky has its values at that time.
+    /// Inputs of the LUTs. `params` has the values at the time of the shot.
     pub fn inputs<'a>(
         &self,
         shot: &Shot<'_>,
@@ -95,20 +96,21 @@ impl Plan {
         Inputs { params, quality, frame, eye: shot.camera.eye, time: shot.time, specialization }
     }
 
-    /// Rows that the buffers of a strip hold: its own, and, where samples are shared between strips, the first of the next.
+    /// Number of rows in the buffers of a strip: its own and, with adaptive sampling, the first row of the next strip, whose
+    /// samples both strips use.
     fn rows(&self, strip: &Range<u32>) -> u32 {
         strip.len() as u32 + u32::from(self.adaptive && strip.end < self.height)
     }
 
-    /// Sets the rows of a strip.
+    /// Sets the range of rows of a strip.
     pub fn set_strip(&self, frame: &mut Frame, strip: &Range<u32>) {
         frame.dispatch.strip_row = strip.start;
         frame.dispatch.rows = strip.len() as u32;
         frame.dispatch.strip_rows = self.rows(strip);
     }
 
-    /// Most rows that the buffers of a strip hold.
-    pub fn most_rows(&self) -> u32 {
+    /// Maximum number of rows in the buffers of a strip.
+    pub fn max_rows(&self) -> u32 {
         self.strips.iter().map(|strip| self.rows(strip)).max().unwrap_or(1)
     }
 }

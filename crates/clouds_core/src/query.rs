@@ -164,13 +164,10 @@ impl Renderer {
              if id.x >= arrayLength(&points) {{ return; }}\nlet x = points[id.x];\n\
              results[id.x] = vec4f({expression});\n}}\n"
         );
-        let linked = Linked::from_source(&source, self.gpu.generated)
+        let specialization = self.points_specialization(params);
+        let linked = Linked::from_source(&source, &specialization.imports, self.gpu.generated)
             .map_err(|error| Error::parameter("imports", error, "shader names"))?;
-        let kernel = Program::from_linked(&self.gpu, &linked)?.compile(
-            &self.gpu,
-            "probe",
-            &self.points_specialization(params),
-        )?;
+        let kernel = Program::from_linked(&self.gpu, &linked)?.compile(&self.gpu, "probe", &specialization)?;
         let camera = Camera::equirect(eye)?;
         // A single dispatch, so that timed probes fill the device.
         let kernel = Which::Made(Arc::new(kernel));

@@ -1,4 +1,4 @@
-//! The frame, top to bottom.
+//! Renderer: one frame from shot to picture, and the state that is kept between frames.
 
 use std::mem;
 use std::sync::{Arc, LazyLock};
@@ -22,10 +22,11 @@ use crate::shot::{Shot, check_size};
 use crate::targets::{Targets, count};
 use crate::wind::Going;
 
-/// What [`Renderer::history_length`] says of a pixel that has had a ray of its own: frames in which every pixel is marched once.
+/// History length of a pixel that has been sampled directly ([`Renderer::history_length`]): the number of frames in which
+/// an animation marches every pixel once.
 pub const CYCLE: u32 = grid::CYCLE;
 
-/// Makes pictures of one size with one numerical method on one device.
+/// Renderer of pictures of one size and quality on one device.
 pub struct Renderer {
     pub(crate) gpu: Arc<Gpu>,
     pub(crate) size: [u32; 2],
@@ -35,23 +36,25 @@ pub struct Renderer {
     still: Option<Targets>,
     animation: Option<Targets>,
     past: Option<Past>,
-    going: Going,
+    winds: Going,
     accumulator: Option<Accumulator>,
-    /// Makes what the moon lights, where that is seen.
+    /// Renderer of moonlight, which has a history of its own (lights.rs).
     pub(crate) moonlit: Option<Box<Self>>,
-    /// Names and bytes of the LUTs, as they were bound last.
+    /// Names of the LUTs bound last, and their sizes in bytes.
     pub(crate) lut_memory: Vec<(&'static str, u64)>,
-    /// Milliseconds on the GPU by kernel, for the last picture or answer.
+    /// GPU time of each kernel in ms, for the last picture or query.
     pub timings: Timings,
 }
 
 impl Renderer {
-    /// A renderer of pictures of `width` by `height` pixels on the adapter that `adapter` means: an index or a part of
-    /// a name, or none for the best.
+    /// Renderer of pictures of `width` x `height` pixels. `adapter` is as in [`Gpu::open`]; None selects the best one.
+    ///
+    /// Returns [`Error::Parameter`] for a value out of range, [`Error::Adapter`] if no adapter matches, and
+    /// [`Error::Fork`] in a forked child.
     pub fn new(width: u32, height: u32, quality: Quality, adapter: Option<&str>) -> Result<Self> {
         quality.check()?;
         check_size([width, height])?;
-        // Each takes a process's first renderer some 20 ms of one thread.
+        // Both take about 20 ms of one thread in the first renderer of a process, and run in parallel.
         let gpu = thread::scope(|scope| {
             scope.spawn(|| LazyLock::force(&blue_noise::TILE));
             Gpu::open(adapter)
@@ -59,7 +62,7 @@ impl Renderer {
         Ok(Self::on(gpu, [width, height], quality))
     }
 
-    /// The same on a device that is open.
+    /// Renderer on an open device.
     pub(crate) fn on(gpu: Arc<Gpu>, size: [u32; 2], quality: Quality) -> Self {
         Self {
             luts: Luts::new(&gpu),
@@ -67,7 +70,7 @@ impl Renderer {
             still: None,
             animation: None,
             past: None,
-            going: Going::default(),
+            winds: Going::default(),
             accumulator: None,
             moonlit: None,
             lut_memory: Vec::new(),
@@ -78,10 +81,11 @@ impl Renderer {
         }
     }
 
-    /// What the last picture has left on the GPU: for whom, the variable of the shaders, and bytes.
+    /// GPU memory after the last picture: owner, name of the shader variable, and size in bytes.
     ///
-    /// The `scene` is what every picture reads, whatever its size, but for `beams`, which small ones have less of; noises among it are shared by the renderers of a device.
-    /// A `still` and an `animation` have buffers of so many bytes a pixel.
+    /// The owner `scene` has the inputs that do not depend on the picture's size, except `light_shafts`, which is
+    /// smaller for small pictures, and the user's scene. Its noise textures are shared by the renderers of a device.
+    /// The owners `still` and `animation` have buffers in proportion to the number of pixels.
     pub fn memory(&self) -> Vec<(&'static str, &'static str, u64)> {
         let mut held: Vec<_> = self.lut_memory.iter().map(|&(name, bytes)| ("scene", name, bytes)).collect();
         let still = self.still.iter().flat_map(|targets| targets.bindings()).map(|held| ("still", held));
@@ -91,13 +95,15 @@ impl Renderer {
         held
     }
 
-    /// The device.
+    /// Device of this renderer.
     pub fn gpu(&self) -> &Arc<Gpu> {
         &self.gpu
     }
 
-    /// Makes pictures of another size and by another method from now on; what has been baked stays, and an animation goes on
-    /// with what it has been following.
+    /// Changes size in pixels and quality of the pictures to come. Baked LUTs are kept, and an animation continues
+    /// with its history.
+    ///
+    /// Returns [`Error::Parameter`] for a value out of range.
     pub fn set(&mut self, width: u32, height: u32, quality: Quality) -> Result<()> {
         quality.check()?;
         check_size([width, height])?;
@@ -115,22 +121,22 @@ impl Renderer {
         self.size
     }
 
-    /// One frame by one light: checked, planned, recorded, submitted.
+    /// Renders a frame with one light source: checks the shot, plans, records and submits.
     pub(crate) fn frame(&mut self, shot: &Shot<'_>, target: Target<'_>, interrupt: Interrupt<'_>) -> Result<Picture> {
         let (mut frame, params) = shot.checked(self.size, &self.quality)?;
         frame.ground_shadow = (shot.background || target.layers()) && frame.has_ground_shadow(shot.camera, &params);
         let past = self.take_past(&shot.of(&params), target, &mut frame);
         let plan = Plan::new(&mut frame, &params, &self.quality, target);
         let past = past.filter(|past| past.is_bare(shot.scene.is_some()) || past.frame.grid == frame.grid);
-        let kept = if target.is_animation() { &mut self.animation } else { &mut self.still };
-        let (targets, resized) = Targets::fit(kept, &self.gpu, &frame, &plan, target.is_animation());
+        let stored = if target.is_animation() { &mut self.animation } else { &mut self.still };
+        let (targets, resized) = Targets::fit(stored, &self.gpu, &frame, &plan, target.is_animation());
         let resized = resized.filter(|_| past.is_some());
-        frame.follow(shot, &params, past.as_ref(), resized.as_ref());
+        frame.set_motion(shot, &params, past.as_ref(), resized.as_ref());
 
         self.timings = Timings::default();
         let mut rec = Recorder::new(&self.gpu, &mut self.timings, interrupt);
         self.luts.update(&mut rec, &plan.inputs(shot, &params, &self.quality, &frame))?;
-        let pixels = frame.view.width * plan.most_rows();
+        let pixels = frame.view.width * plan.max_rows();
         let scene =
             SceneTextures::fit(&mut self.scene_depth, &self.gpu, frame.scene.then(|| shot.scene_or_none()), pixels);
         rec.bind(scene.map_or(Vec::new(), SceneTextures::bindings));
@@ -170,7 +176,8 @@ impl Renderer {
         Ok(picture)
     }
 
-    /// Takes out the frame before, where the next one may be reprojected from it: if that fails, the one after is a still.
+    /// Takes the previous frame out of the renderer, if this frame can be reprojected from it. After a failed frame
+    /// there is none, and the next frame is a still.
     fn take_past(&mut self, shot: &Shot<'_>, target: Target<'_>, frame: &mut Frame) -> Option<Past> {
         let Target::Still { first_sample, .. } = target else {
             let cloudless = Integrator::March.is_cloudless(shot.params);
@@ -182,8 +189,9 @@ impl Renderer {
         None
     }
 
-    /// The next frame of an animation by one light: a sixteenth of its pixels is marched, the others are reprojected. The
-    /// first frame, and the first after a cut, is a still.
+    /// Renders the next frame of an animation with one light source: one sample in sixteen is marched (one in four at
+    /// low resolution), the others are reprojected. The first frame, and the first after a cut, is a still. The image is
+    /// empty if it is rendered to a screen.
     pub(crate) fn next_frame(
         &mut self,
         shot: &Shot<'_>,
@@ -191,7 +199,7 @@ impl Renderer {
         interrupt: Interrupt<'_>,
     ) -> Result<Vec<f32>> {
         let cut = self.past.as_ref().is_some_and(|past| past.is_cut(shot));
-        let params = &self.going.on(shot.params, shot.time, cut);
+        let params = &self.winds.on(shot.params, shot.time, cut);
         let shot = &shot.of(params);
         if self.quality.integrator_of(params) == Integrator::March {
             self.check_pixels(shot)?;
@@ -202,7 +210,7 @@ impl Renderer {
         Ok(image)
     }
 
-    /// Whether a frame of an animation may be so large.
+    /// Checks that an animated frame fits the buffers and textures of the device.
     fn check_pixels(&self, shot: &Shot<'_>) -> Result<()> {
         let [width, height] = self.size;
         let scene = shot.scene.map_or(u64::MAX, |_| SceneTextures::MOST_PIXELS);
@@ -214,11 +222,11 @@ impl Renderer {
         Err(Error::parameter("width x height", format!("{width} x {height}"), allowed))
     }
 
-    /// A still, or, of the same shot again, a better one.
+    /// Renders a still. While the shot does not change, path tracing accumulates the mean of the stills.
     fn accumulate(&mut self, shot: &Shot<'_>, interrupt: Interrupt<'_>) -> Result<Vec<f32>> {
         let last = self.accumulator.take().filter(|last| last.is_of(shot));
         let mut mean = last.unwrap_or_else(|| Accumulator::new(shot));
-        // What has converged stays.
+        // The reference integrator has converged after one still.
         if mean.count == 0 || self.quality.integrator_of(shot.params) == Integrator::Path {
             let first_sample = mean.count.wrapping_mul(self.quality.path_samples);
             mean.add(self.frame(shot, Target::Still { layers: false, first_sample }, interrupt)?.image);
@@ -228,14 +236,18 @@ impl Renderer {
         Ok(image)
     }
 
-    /// How much each pixel of the last frame of [`Renderer::animate`] rests on, row by row, from 1, a guess from the rays
-    /// around it in that frame alone, to [`CYCLE`], a ray of its own that has been followed since; between those, the mean of guesses
-    /// in so many frames. Empty where no frame was reprojected or could be: before the first, after a cut, without clouds, and
-    /// where frames converge or are traced.
+    /// History length of each pixel of the last frame of [`Renderer::animate`] in frames, row by row.
+    ///
+    /// [`CYCLE`] is a pixel that was sampled directly: marched in that frame, or marched earlier and reprojected since.
+    /// Less is the number of frames since the pixel was interpolated from the rays around it; 1 was interpolated in that
+    /// frame. Empty without reprojection: before the first frame, after [`Renderer::cut`], without clouds, and with the
+    /// integrators `reference` and `path`.
+    ///
+    /// Returns [`Error::Fork`] in a forked child.
     pub fn history_length(&mut self) -> Result<Vec<u32>> {
         check_fork()?;
-        let followed = self.past.as_ref().is_some_and(|past| !past.frame.cloudless);
-        let Some(targets) = self.animation.as_ref().filter(|targets| followed && targets.grid.size == self.size) else {
+        let reprojected = self.past.as_ref().is_some_and(|past| !past.frame.cloudless);
+        let Some(targets) = self.animation.as_ref().filter(|targets| reprojected && targets.grid.size == self.size) else {
             return Ok(Vec::new());
         };
         let Some(temporal) = &targets.temporal else { return Ok(Vec::new()) };
@@ -252,15 +264,16 @@ impl Renderer {
         Ok((0..height).flat_map(|y| (0..width).map(move |x| at(x, y))).collect())
     }
 
-    /// Forgets the frame before: the next one of [`Renderer::animate`] is a still.
+    /// Discards the history: the next frame of [`Renderer::animate`] is a still.
     pub fn cut(&mut self) {
         self.forget();
         self.moonlit.iter_mut().for_each(|lit| lit.forget());
     }
 
+    /// Discards the history of this light source.
     pub(crate) fn forget(&mut self) {
         self.accumulator = None;
-        self.going = Going::default();
+        self.winds = Going::default();
         self.past = None;
     }
 }

@@ -6,10 +6,10 @@ use std::sync::Arc;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::luts::{large_scale_weather, majorant, multiscatter, noise, shadow, sky, weather};
-use crate::params::{self, Params, Quality};
+use crate::params::{self, Model, Params, Quality};
 use crate::schema::{Block, wgsl_struct};
 use crate::uniforms::{Dispatch, Sky, View};
-use crate::{blue_noise, camera, color, frame, gpu, grid, moon, scene_depth};
+use crate::{blue_noise, camera, color, frame, gpu, grid, moon, scene_depth, specialization};
 
 pub use crate::gpu::{Linked, names};
 
@@ -41,12 +41,12 @@ pub fn read(name: &str) -> Option<String> {
 
 /// Links a WGSL file with all of its imports.
 pub fn link(name: &str) -> std::result::Result<Linked, String> {
-    Linked::new(name, generated)
+    Linked::new(name, &[specialization::light_model(Model::Octaves)], generated)
 }
 
 /// Links WGSL source with all of its imports.
 pub fn link_source(source: &str) -> std::result::Result<Linked, String> {
-    Linked::from_source(source, generated)
+    Linked::from_source(source, &[specialization::light_model(Model::Octaves)], generated)
 }
 
 /// Source of a generated module.

@@ -1,4 +1,4 @@
-//! What a picture is of, and what is checked of it before any work.
+//! Shot: camera, sky and time of a picture, checked before any GPU work.
 
 use crate::camera::Camera;
 use crate::error::{Error, Result};
@@ -7,33 +7,35 @@ use crate::gpu::check_fork;
 use crate::params::{Params, Quality};
 use crate::scene_depth::SceneDepth;
 
-/// A camera before a sky at a time.
+/// Camera, sky and time of a picture.
 #[derive(Clone, Copy)]
 pub struct Shot<'a> {
-    /// Where from, and which way.
+    /// Position, orientation and projection of the camera.
     pub camera: &'a Camera,
-    /// The sky.
+    /// Parameters of the sky.
     pub params: &'a Params,
-    /// Seconds.
+    /// Time in s.
     pub time: f64,
-    /// Whether the picture is of the whole sky, with alpha 1; else of the clouds alone, premultiplied.
+    /// Whether the clouds are composited over the background, with an alpha of 1. Otherwise the picture has the clouds
+    /// alone, premultiplied.
     pub background: bool,
-    /// What hides clouds behind it. With its radiance it is a part of the picture, without it alpha leaves room for it.
+    /// User-supplied scene, which hides the clouds behind it. With radiance it is composited into the picture. Without
+    /// radiance alpha is prepared for a later blend with the scene.
     pub scene: Option<SceneDepth<'a>>,
 }
 
 impl<'a> Shot<'a> {
-    /// The whole sky, without a scene.
+    /// Shot with background and without a scene. `time` in s.
     pub fn new(camera: &'a Camera, params: &'a Params, time: f64) -> Self {
         Self { camera, params, time, background: true, scene: None }
     }
 
-    /// The scene of the user, or an empty one.
+    /// User's scene, or an empty one.
     pub(crate) fn scene_or_none(&self) -> SceneDepth<'a> {
         self.scene.unwrap_or(SceneDepth { distance: &[], color: None })
     }
 
-    /// The same of another sky.
+    /// Shot with other parameters.
     pub(crate) fn of<'b>(&self, params: &'b Params) -> Shot<'b>
     where
         'a: 'b,
@@ -41,7 +43,9 @@ impl<'a> Shot<'a> {
         Shot { params, ..*self }
     }
 
-    /// The frame of a picture of `size` pixels, and its sky, in which what wanders has its value.
+    /// Frame of a picture of `size` pixels, and the parameters at its time, in which the wander has been evaluated.
+    ///
+    /// Returns [`Error::Parameter`] for a value that is not allowed, and [`Error::Fork`] in a forked child.
     pub(crate) fn checked(&self, size: [u32; 2], quality: &Quality) -> Result<(Frame, Params)> {
         check_fork()?;
         self.params.check()?;
@@ -61,7 +65,7 @@ impl<'a> Shot<'a> {
     }
 }
 
-/// Whether a picture may have so many pixels.
+/// Checks width and height in pixels.
 pub(crate) fn check_size([width, height]: [u32; 2]) -> Result<()> {
     for (name, value) in [("width", width), ("height", height)] {
         if !(1..=65536).contains(&value) {

@@ -1,12 +1,12 @@
-//! What the kernels of a picture are compiled for: the values of the `override` constants of the shaders, from one table.
+//! Specialization tables: the values of the `override` constants that kernels are compiled for, by name.
 
 use std::sync::Arc;
 
 use crate::frame::Frame;
-use crate::gpu::Specialization;
+use crate::gpu::{Import, Specialization};
 use crate::params::{Model, Params, Quality, WeatherNoise};
 
-/// The table of a picture. `layers`: the sky and the depth are asked for too.
+/// Table of a picture. `layers`: background radiance and depth are outputs too.
 pub(crate) fn of_picture(params: &Params, quality: &Quality, frame: &Frame, layers: bool) -> Arc<Specialization> {
     let high = frame.high_clouds;
     let on = |on: bool| f64::from(u8::from(on));
@@ -29,41 +29,54 @@ pub(crate) fn of_picture(params: &Params, quality: &Quality, frame: &Frame, laye
     ])
 }
 
-/// The table of what is asked of a sky without a picture.
+/// Table of queries of a sky without a picture.
 pub(crate) fn of_points(params: &Params, quality: &Quality) -> Arc<Specialization> {
     Arc::new(of_sky(params, quality))
 }
 
-/// The table of bakes that know no picture.
+/// Table of bakes that are independent of the picture.
 pub(crate) fn of_bakes() -> Arc<Specialization> {
     of_points(&Params::default(), &Quality::default())
+}
+
+/// File of a light model, by the name that light.wgsl imports. The path tracer shades the high clouds, which have no
+/// thickness, by octaves.
+pub(crate) fn light_model(model: Model) -> Import {
+    let file = match model {
+        Model::Single => "light_models/single",
+        Model::Octaves | Model::Path => "light_models/octaves",
+        Model::Nubis2015 => "light_models/nubis2015",
+        Model::Thesis2018 => "light_models/thesis2018",
+        Model::Vsu2022 => "light_models/vsu2022",
+    };
+    ("light_model", file)
 }
 
 fn of_sky(params: &Params, quality: &Quality) -> Specialization {
     let on = |on: bool| f64::from(u8::from(on));
     let light = &params.light;
-    // High clouds have no thickness to trace paths through.
-    let model = if light.model == Model::Path { Model::Octaves } else { light.model };
     let volume = params.volume.is_some();
     let cheap = quality.cheap_light < 1.0 || quality.far_sample || quality.light_distance <= 0.0;
-    Specialization::new([
-        ("MODEL", f64::from(model as u32)),
-        ("PHASE", f64::from(light.phase as u32)),
-        ("VOLUME", on(volume)),
-        ("PRECISE", on(quality.is_precise(params))),
-        ("KEEP_CLEAR", on(params.clear_spot().1 > 0.0 && !volume)),
-        ("AIR", on(params.atmosphere.enabled)),
-        ("SUNLIT", 1.0),
-        ("RAINY", on(params.is_rainy())),
-        ("RAIN_SHAFTS", on(params.has_rain_shafts())),
-        ("UPPER", on(params.has_upper_clouds())),
-        ("LARGE_SCALE_WEATHER", on(params.has_large_scale_weather())),
-        ("PROFILE_TABLE", on(params.clouds.profile.is_some() && !volume)),
-        ("LIGHT_DETAIL", on(quality.cheap_light > 0.0)),
-        ("LIGHT_CHEAP", on(cheap)),
-        ("WEATHER_NOISE", f64::from(WeatherNoise::WorleyPerlin as u32)),
-        ("HIGH_LOW_SUN", 0.0),
-    ])
+    Specialization::new(
+        [
+            ("PHASE", f64::from(light.phase as u32)),
+            ("VOLUME", on(volume)),
+            ("PRECISE", on(quality.is_precise(params))),
+            ("KEEP_CLEAR", on(params.clear_spot().1 > 0.0 && !volume)),
+            ("AIR", on(params.atmosphere.enabled)),
+            ("SUNLIT", 1.0),
+            ("RAINY", on(params.is_rainy())),
+            ("RAIN_SHAFTS", on(params.has_rain_shafts())),
+            ("UPPER", on(params.has_upper_clouds())),
+            ("LARGE_SCALE_WEATHER", on(params.has_large_scale_weather())),
+            ("PROFILE_TABLE", on(params.clouds.profile.is_some() && !volume)),
+            ("LIGHT_DETAIL", on(quality.cheap_light > 0.0)),
+            ("LIGHT_CHEAP", on(cheap)),
+            ("WEATHER_NOISE", f64::from(WeatherNoise::WorleyPerlin as u32)),
+            ("HIGH_LOW_SUN", 0.0),
+        ],
+        vec![light_model(light.model)],
+    )
 }
 
 #[cfg(test)]
@@ -73,7 +86,7 @@ mod tests {
     use super::*;
     use crate::shader;
 
-    /// A name that stands in one of them only is a switch that does nothing, or one that nobody sets.
+    /// A name in the table alone would have no effect, and an override in the shaders alone would never be set.
     #[test]
     fn the_table_and_the_shaders_name_the_same_constants() {
         let frame = Frame::default();
@@ -82,13 +95,13 @@ mod tests {
         let mut theirs = BTreeSet::new();
         for name in shader::names() {
             let (module, _) = shader::link(name).expect("links").parse().expect("is valid");
-            // Those that are worked out from others are nobody's to set.
-            let free = |constant: &wgpu::naga::Override| {
+            // Overrides derived from other overrides are not set by the table.
+            let is_settable = |constant: &wgpu::naga::Override| {
                 constant
                     .init
                     .is_none_or(|init| matches!(module.global_expressions[init], wgpu::naga::Expression::Literal(_)))
             };
-            theirs.extend(module.overrides.iter().filter(|(_, o)| free(o)).filter_map(|(_, o)| o.name.clone()));
+            theirs.extend(module.overrides.iter().filter(|(_, o)| is_settable(o)).filter_map(|(_, o)| o.name.clone()));
         }
         assert_eq!(ours, theirs);
     }

@@ -1,4 +1,4 @@
-//! Buffers that a picture is rendered into. They are kept from one picture to the next.
+//! Render targets: buffers that a picture is rendered to, reused by the pictures after it.
 
 use crate::frame::Frame;
 use crate::gpu::Bindings;
@@ -19,21 +19,21 @@ pub(crate) struct Targets {
     pub grid: SampleGrid,
     integrator: Integrator,
     pub ray_list: RayList,
-    /// Clouds of the picture; in an animation with their history lengths.
+    /// Clouds of this picture; in an animation with history lengths.
     pub now: HistoryBuffers,
     pub background: Background,
     pub output: Output,
-    /// State of the rays that converge or are traced.
+    /// Ray states of the reference integrator and of path tracing.
     pub rays: Option<Rays>,
     pub temporal: Option<Temporal>,
 }
 
-/// What an animation keeps from frame to frame.
+/// Buffers of temporal reprojection.
 pub(crate) struct Temporal {
     pub current: Current,
     /// Clouds of the previous frame.
     pub before: HistoryBuffers,
-    /// Scene of the user in the previous frame.
+    /// User's scene in the previous frame.
     pub scene_before: SceneTextures,
 }
 
@@ -62,36 +62,36 @@ impl Targets {
         }
     }
 
-    /// Buffers for the strips of a plan, the kept ones where they serve. Of an animation whose sample grid has changed the
-    /// second are those of the previous frame.
+    /// Buffers for the strips of a plan: the stored ones if they fit, else new ones. The second result has the buffers
+    /// of the previous frame of an animation whose sample grid has changed.
     pub fn fit<'a>(
-        kept: &'a mut Option<Self>,
+        stored: &'a mut Option<Self>,
         gpu: &Gpu,
         frame: &Frame,
         plan: &Plan,
         animated: bool,
     ) -> (&'a mut Self, Option<Self>) {
-        let grid = frame.grid.strip(plan.most_rows());
-        let serve = |old: &Self| {
-            let alike = old.grid.strip(0) == grid.strip(0) && old.integrator == plan.integrator;
-            alike && if animated { old.grid == grid } else { old.grid.size[1] >= grid.size[1] }
+        let grid = frame.grid.strip(plan.max_rows());
+        let fits = |old: &Self| {
+            let same = old.grid.strip(0) == grid.strip(0) && old.integrator == plan.integrator;
+            same && if animated { old.grid == grid } else { old.grid.size[1] >= grid.size[1] }
         };
-        let old = kept.take_if(|old| !serve(old)).filter(|_| animated);
-        (kept.get_or_insert_with(|| Self::new(gpu, grid, plan.integrator, animated)), old)
+        let old = stored.take_if(|old| !fits(old)).filter(|_| animated);
+        (stored.get_or_insert_with(|| Self::new(gpu, grid, plan.integrator, animated)), old)
     }
 
-    /// Clouds of the picture.
+    /// Buffers of the marched clouds.
     pub fn clouds(&self) -> &CloudBuffers {
         &self.now.cloud_buffers
     }
 
-    /// What the composite reads and writes.
+    /// Buffers of the composite pass.
     pub fn parts(&self) -> Parts<'_> {
         let Self { now, background, ray_list, output, .. } = self;
         Parts { cloud_buffers: &now.cloud_buffers, background_corners: background, ray_list, out: output }
     }
 
-    /// What reprojection reads and writes, in an animation.
+    /// Buffers of temporal reprojection; None for a still. `resized` has those of a previous frame on another grid.
     pub fn reprojection<'a>(&'a self, resized: Option<&'a Self>) -> Option<reproject::Buffers<'a>> {
         let Self { ray_list, now, temporal, .. } = self;
         let Temporal { current, before, scene_before } = temporal.as_ref()?;
@@ -99,7 +99,7 @@ impl Targets {
         Some(reproject::Buffers { ray_list, current, before, resized, scene_before, now })
     }
 
-    /// Buffers on the device by name.
+    /// Bindings of all buffers, by name.
     pub fn bindings(&self) -> Bindings {
         let Self { ray_list, now, background, output, rays, temporal, .. } = self;
         let rays = rays.as_ref().map_or(Vec::new(), |rays| rays.bindings("rays"));
@@ -112,6 +112,7 @@ impl Targets {
     }
 }
 
+/// Number of elements of a 2D grid.
 pub(crate) fn count(size: [u32; 2]) -> u64 {
     size.map(u64::from).iter().product()
 }

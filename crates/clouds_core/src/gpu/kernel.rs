@@ -13,7 +13,7 @@ use wgpu::naga::{
 
 use super::adapter::lock;
 use super::device::Gpu;
-use super::link::Linked;
+use super::link::{Import, Linked};
 use crate::error::{Error, Result};
 
 /// Pass and entry point.
@@ -78,21 +78,25 @@ impl From<&wgpu::Sampler> for Binding {
 /// Specialization table: values of `override` constants by name. A kernel is compiled for the constants that it reads:
 /// unused features are compiled out instead of branched over.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Specialization(Vec<(&'static str, f64)>);
+pub(crate) struct Specialization {
+    values: Vec<(&'static str, f64)>,
+    /// Files that are linked for names of imports.
+    pub imports: Vec<Import>,
+}
 
 impl Specialization {
     /// Table of the given values.
-    pub fn new(values: impl IntoIterator<Item = (&'static str, f64)>) -> Self {
-        Self(values.into_iter().collect())
+    pub fn new(values: impl IntoIterator<Item = (&'static str, f64)>, imports: Vec<Import>) -> Self {
+        Self { values: values.into_iter().collect(), imports }
     }
 
     /// Copy with some values replaced or added.
     pub fn with(&self, values: &[(&'static str, f64)]) -> Arc<Self> {
         let mut table = self.clone();
         for (name, value) in values {
-            match table.0.iter_mut().find(|(key, _)| key == name) {
+            match table.values.iter_mut().find(|(key, _)| key == name) {
                 Some((_, old)) => *old = *value,
-                None => table.0.push((name, *value)),
+                None => table.values.push((name, *value)),
             }
         }
         Arc::new(table)
@@ -101,11 +105,11 @@ impl Specialization {
     /// Names of the constants.
     #[cfg(test)]
     pub fn names(&self) -> impl Iterator<Item = &'static str> {
-        self.0.iter().map(|(name, _)| *name)
+        self.values.iter().map(|(name, _)| *name)
     }
 
     fn get(&self, name: &str) -> Option<f64> {
-        self.0.iter().find(|(key, _)| *key == name).map(|(_, value)| *value)
+        self.values.iter().find(|(key, _)| *key == name).map(|(_, value)| *value)
     }
 }
 
@@ -113,6 +117,8 @@ impl Specialization {
 pub(crate) struct Program {
     shader: wgpu::ShaderModule,
     entries: HashMap<String, Entry>,
+    /// Imports that a specialization table has resolved.
+    imports: Vec<Import>,
 }
 
 /// Reflection of an entry point.
@@ -136,8 +142,8 @@ pub(crate) type Key = (String, String, Vec<Option<u64>>);
 
 impl Program {
     /// Links and validates a pass.
-    pub fn new(gpu: &Gpu, pass: &str) -> Result<Self> {
-        let linked = Linked::new(&format!("passes/{pass}"), gpu.generated).map_err(Error::Device)?;
+    pub fn new(gpu: &Gpu, pass: &str, imports: &[Import]) -> Result<Self> {
+        let linked = Linked::new(&format!("passes/{pass}"), imports, gpu.generated).map_err(Error::Device)?;
         Self::from_linked(gpu, &linked)
     }
 
@@ -161,7 +167,7 @@ impl Program {
         // gfx-rs/wgpu#7698). All shaders are part of this crate, and each of their loops terminates. Bounds checks stay
         // on.
         let shader = unsafe { gpu.device.create_shader_module_trusted(descriptor, checks) };
-        Ok(Self { shader, entries })
+        Ok(Self { shader, entries, imports: linked.resolved.clone() })
     }
 
     fn entry(&self, name: &str) -> Result<&Entry> {
@@ -171,7 +177,9 @@ impl Program {
     /// Identity of the kernel of an entry point with a specialization table.
     pub fn key(&self, (pass, entry): (&str, &str), specialization: &Specialization) -> Result<Key> {
         let values = self.entry(entry)?.constants.iter().map(|name| specialization.get(name).map(f64::to_bits));
-        Ok((pass.to_owned(), entry.to_owned(), values.collect()))
+        let files = self.imports.iter().map(|(_, file)| *file);
+        let program: Vec<_> = std::iter::once(pass).chain(files).collect();
+        Ok((program.join(" "), entry.to_owned(), values.collect()))
     }
 
     /// Compiles an entry point for a specialization table.
@@ -351,7 +359,7 @@ struct KernelCache {
 /// Programs and kernels of a device.
 #[derive(Default)]
 struct Kernels {
-    programs: Mutex<HashMap<&'static str, Arc<Program>>>,
+    programs: Mutex<HashMap<&'static str, Vec<Arc<Program>>>>,
     cache: Mutex<KernelCache>,
 }
 
@@ -371,18 +379,20 @@ impl KernelCache {
 
 impl Gpu {
     /// Program of a pass, linked and validated on first use.
-    fn program(&self, pass: &'static str) -> Result<Arc<Program>> {
+    fn program(&self, pass: &'static str, imports: &[Import]) -> Result<Arc<Program>> {
         let kernels = self.common::<Kernels>();
-        let linked = lock(&kernels.programs).get(pass).cloned();
+        let same = |program: &&Arc<Program>| program.imports.iter().all(|import| imports.contains(import));
+        let linked = lock(&kernels.programs).get(pass).and_then(|programs| programs.iter().find(same).cloned());
         if let Some(program) = linked {
             return Ok(program);
         }
-        let program = Arc::new(Program::new(self, pass)?);
-        Ok(lock(&kernels.programs).entry(pass).or_insert(program).clone())
+        let program = Arc::new(Program::new(self, pass, imports)?);
+        lock(&kernels.programs).entry(pass).or_default().push(program.clone());
+        Ok(program)
     }
 
     fn slot(&self, name: Name, specialization: &Specialization) -> Result<(Arc<Program>, Slot)> {
-        let program = self.program(name.0)?;
+        let program = self.program(name.0, &specialization.imports)?;
         let key = program.key(name, specialization)?;
         let common = self.common::<Kernels>();
         let mut kernels = lock(&common.cache);

@@ -8,33 +8,42 @@ include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
 /// Source of a generated module by its name; None for other names.
 pub(crate) type Generated = fn(&str) -> Option<String>;
 
+/// File that is linked for the name of an import.
+pub(crate) type Import = (&'static str, &'static str);
+
 /// Self-contained WGSL module with the origin of each line.
 pub struct Linked {
     /// WGSL source.
     pub code: String,
+    /// Imports that were resolved by the table of the caller.
+    pub(crate) resolved: Vec<Import>,
     lines: Vec<(String, usize)>,
 }
 
 impl Linked {
     /// Links the file `root` with all of its imports. The order of WGSL declarations is free, so imports are appended.
-    pub(crate) fn new(root: &str, generated: Generated) -> Result<Self, String> {
+    /// An import in the table is that of its file.
+    pub(crate) fn new(root: &str, table: &[Import], generated: Generated) -> Result<Self, String> {
         let source = read(root, generated).ok_or_else(|| missing(root))?;
-        Self::of(root, &source, generated)
+        Self::of(root, &source, table, generated)
     }
 
     /// Links `source` with all of its imports.
-    pub(crate) fn from_source(source: &str, generated: Generated) -> Result<Self, String> {
-        Self::of("(source)", source, generated)
+    pub(crate) fn from_source(source: &str, table: &[Import], generated: Generated) -> Result<Self, String> {
+        Self::of("(source)", source, table, generated)
     }
 
-    fn of(root: &str, source: &str, generated: Generated) -> Result<Self, String> {
-        let mut linked = Self { code: String::new(), lines: Vec::new() };
+    fn of(root: &str, source: &str, table: &[Import], generated: Generated) -> Result<Self, String> {
+        let mut linked = Self { code: String::new(), resolved: Vec::new(), lines: Vec::new() };
         let mut queue = vec![(root.to_owned(), source.to_owned())];
         let mut seen = HashSet::from([root.to_owned()]);
         while let Some((file, source)) = queue.pop() {
             for (number, line) in source.lines().enumerate() {
                 match line.strip_prefix("#import ") {
                     Some(import) if seen.insert(import.to_owned()) => {
+                        let resolved = table.iter().find(|(name, _)| *name == import);
+                        linked.resolved.extend(resolved);
+                        let import = resolved.map_or(import, |(_, file)| *file);
                         let source = read(import, generated).ok_or_else(|| format!("{file}: {}", missing(import)))?;
                         queue.push((import.to_owned(), source));
                     }

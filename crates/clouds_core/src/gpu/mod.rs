@@ -10,7 +10,7 @@ mod recorder;
 
 pub(crate) use device::{COPIED, Download, constants as device_constants, texture_bytes, texture_rows};
 pub(crate) use kernel::{Binding, Bindings, Name, Program, Specialization};
-pub(crate) use link::read;
+pub(crate) use link::{Import, read};
 pub(crate) use recorder::{List, Recorder, Token, Which, constants as recorder_constants};
 
 pub use adapter::{AdapterInfo, adapters, check_fork, driver_settings, lock};

@@ -89,7 +89,7 @@ pub(super) fn load_or_bake<'a>(
         bake(rec);
         return Ok(());
     }
-    let shader = Linked::new(&format!("passes/{pass}"), gpu.generated).map_err(Error::Device)?.code;
+    let shader = Linked::new(&format!("passes/{pass}"), &[], gpu.generated).map_err(Error::Device)?.code;
     let bytes: Vec<_> = textures.iter().map(|texture| texture_bytes(texture, 1) as usize).collect();
     // Drivers round differently.
     let key = format!("{} {}\n{key}\n{bytes:?}\n{shader}", gpu.info.name, gpu.info.driver);

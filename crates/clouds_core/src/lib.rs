@@ -23,6 +23,8 @@ pub mod params;
 mod passes;
 pub mod picture;
 mod plan;
+mod published;
+mod quality;
 mod query;
 pub mod renderer;
 pub mod scene_depth;

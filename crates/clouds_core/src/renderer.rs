@@ -247,7 +247,8 @@ impl Renderer {
     pub fn history_length(&mut self) -> Result<Vec<u32>> {
         check_fork()?;
         let reprojected = self.past.as_ref().is_some_and(|past| !past.frame.cloudless);
-        let Some(targets) = self.animation.as_ref().filter(|targets| reprojected && targets.grid.size == self.size) else {
+        let Some(targets) = self.animation.as_ref().filter(|targets| reprojected && targets.grid.size == self.size)
+        else {
             return Ok(Vec::new());
         };
         let Some(temporal) = &targets.temporal else { return Ok(Vec::new()) };

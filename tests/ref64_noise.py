@@ -534,7 +534,7 @@ class Field:
             extinction = np.where(upper_limit > limit, upper * f32(deck.extinction), extinction)
         return extinction
 
-    def leant(self, points, altitude):
+    def sheared(self, points, altitude):
         """Without the lean of the wind."""
         clouds, wind = self.params.clouds, self.params.wind
         height = (altitude - f32(clouds.base)) / (f32(clouds.top) - f32(clouds.base))
@@ -562,7 +562,7 @@ class Field:
     def weather(self, points, altitude):
         """Where the weather is read, and what it says: coverage, type, precipitation."""
         drift = self.weather_drift()
-        upright = self.leant(points, altitude)
+        upright = self.sheared(points, altitude)
         on_map = (upright - drift) / f32(self.params.weather.extent)
         texel = self.texel(on_map, upright, drift)
         coverage, kind, rain = weather_from_map(texel, self.params.clouds)
@@ -603,7 +603,7 @@ class Field:
         extent = f32(self.params.weather.extent) * scale
         drift = blown(self.params, deck.direction, deck.speed, self.time)
         on_map = (upright - drift) / extent + (0.37 - 0.5, 0.61 + 0.5)
-        texel = self.texel(on_map, self.leant(points, altitude), self.weather_drift())
+        texel = self.texel(on_map, self.sheared(points, altitude), self.weather_drift())
         coverage = np.clip(texel[:, 0] + 2 * f32(deck.coverage) - 1, 0, 1)
         coverage = coverage * kept_clear(points, self.params.weather)
         kind = np.clip(texel[:, 1] + 2 * f32(deck.type) - 1, 0, 1)

@@ -254,7 +254,7 @@ def among_slabs(grid, **changes):
         "sun.azimuth": 180.0,
         "sun.visible": False,
         "high_clouds.coverage": 0.0,
-        "atmosphere.beams": False,  # test_beams.py
+        "atmosphere.beams": False,  # test_light_shafts.py
         **UNIT,
     }
     return nubis.Params(volume=grid).with_(**{**base, **changes})

@@ -266,7 +266,7 @@ def test_history_grows_until_each_pixel_has_had_its_ray():
     # Of a still, 15 is between its rays.
     assert (lengths[0] >= 15).all()
     # What comes in at the right has a ray or is between two that look alike, and then for so many
-    # frames; test_sparse.py has where histories go.
+    # frames; test_low_resolution.py has where histories go.
     assert np.isin(lengths[2][:, -8:], (1, 16)).all()
     assert (lengths[2][:, : SIZE[0] // 2] < 15).mean() < 0.1
     for i, length in enumerate(lengths[2:]):

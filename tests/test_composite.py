@@ -222,8 +222,8 @@ def test_sizes_that_four_does_not_divide(size):
         np.testing.assert_allclose(picture(few), picture(full), rtol=0.05)
 
 
-def test_sheets_do_not_show():
-    """A still of two sheets, and the first frame of an animation, which is one."""
+def test_strips_do_not_show():
+    """A still of two strips, and the first frame of an animation, which is one."""
     size = 2048, 600
     camera = looking(0.0, 16.0, 50.0)
     still = nubis.Renderer(*size, quality=quality(0.5)).render(camera, CIRRUS)

@@ -24,13 +24,13 @@ def clouds(of):
     return np.concatenate([of["radiance"], of["transmittance"][..., None]], axis=-1)
 
 
-def lattice(size):
+def sample_grid(size):
     """The columns or rows that are marched first: every fourth, and the last."""
     return sorted({*range(0, size, 4), size - 1})
 
 
 def around(n, size, step):
-    """The lattice's columns or rows beside one, or on both sides of one of its own."""
+    """The grid's columns or rows beside one, or on both sides of one of its own."""
     if n % step:
         return [n - n % step, n - n % step + step]
     return [max(n - step, 0), n, min(n + step, size - 1)]
@@ -103,9 +103,9 @@ def test_it_costs_little_error(scene):
     "size", [(1, 1), (1, 7), (7, 1), (2, 2), (3, 5), (4, 4), (5, 4), (6, 9), (23, 18)]
 )
 def test_sizes_that_four_does_not_divide(size):
-    """Every pixel gets a value, and those of the lattice the same as without."""
+    """Every pixel gets a value, and those of the grid the same as without."""
     full, few = (layers(size, contrast, "overcast", "draft") for contrast in (0.0, 0.2))
-    rows, columns = np.ix_(lattice(size[1]), lattice(size[0]))
+    rows, columns = np.ix_(sample_grid(size[1]), sample_grid(size[0]))
     for name, expected in full.items():
         if name == "sky":  # interpolated too (test_composite.py)
             np.testing.assert_allclose(few[name], expected, rtol=0.01)
@@ -128,11 +128,11 @@ def test_it_follows_from_the_picture_alone(size):
 
 
 @pytest.mark.slow
-def test_sheets_meet(monkeypatch):
-    """A picture of more than a million pixels is made in sheets, which share a row of rays."""
-    size = 4096, 264  # 256 rows a sheet
+def test_strips_meet(monkeypatch):
+    """A picture of more than a million pixels is made in strips, which share a row of rays."""
+    size = 4096, 264  # 256 rows a strip
     full, few = (layers(size, contrast, "cirrus", "draft") for contrast in (0.0, 0.2))
-    rows, columns = np.ix_(lattice(size[1]), lattice(size[0]))
+    rows, columns = np.ix_(sample_grid(size[1]), sample_grid(size[0]))
     assert np.array_equal(few["transmittance"][rows, columns], full["transmittance"][rows, columns])
     error = np.abs(few["radiance"] - full["radiance"]).max(axis=(1, 2))
     assert error[252:260].max() <= 2 * error.max(initial=0.1)

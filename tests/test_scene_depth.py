@@ -90,7 +90,7 @@ def test_path_tracing_ends_at_the_scene(monkeypatch):
 @pytest.mark.parametrize("contrast", [0.0, 0.2])
 def test_nothing_there_changes_nothing(scene, contrast):
     """Where the scene is infinitely far the picture is the same to the bit: everywhere, and beside
-    a scene; between rays of a lattice, as far as the scene does not reach.
+    a scene; between samples of a grid, as far as the scene does not reach.
     """
     camera, params = nubis.scenes[scene]
     camera = narrow(camera)
@@ -109,25 +109,25 @@ def test_nothing_there_changes_nothing(scene, contrast):
 
 
 @pytest.mark.slow
-def test_lattices_do_not_reach_across_the_scene():
-    """With rays between rays of a lattice, edges of the scene are as if every ray were marched."""
+def test_sample_grids_do_not_reach_across_the_scene():
+    """With rays between samples of a grid, edges of the scene are as if every ray were marched."""
     camera, params = nubis.scenes["fair_weather"]
     camera = narrow(camera)
     size = 320, 180
     y, x = np.mgrid[: size[1], : size[0]]
     depth = np.where((x // 5 + y // 7) % 3 == 0, 1500.0, np.where(x % 31 == 3, 6000.0, np.inf))
-    every, lattice = (
+    every, adaptive = (
         nubis.Renderer(*size, quality=nubis.quality("draft").replace(contrast=c)).render_layers(
             camera, params, scene_depth=depth
         )
         for c in (0.0, 0.2)
     )
-    assert (lattice["samples"] == 0).mean() > 0.1 + (every["samples"] == 0).mean()
+    assert (adaptive["samples"] == 0).mean() > 0.1 + (every["samples"] == 0).mean()
     beside = np.isfinite(depth)
     for layer in ("radiance", "transmittance"):
-        assert np.array_equal(every[layer][beside], lattice[layer][beside])
+        assert np.array_equal(every[layer][beside], adaptive[layer][beside])
     # Beside it rays look everywhere, not only where the scene let their neighbours see cloud.
-    assert np.abs(every["transmittance"] - lattice["transmittance"]).mean() < 0.01
+    assert np.abs(every["transmittance"] - adaptive["transmittance"]).mean() < 0.01
 
 
 def test_scene_colour_in_clear_air():
@@ -217,10 +217,10 @@ def test_high_clouds_and_sun_are_behind_it():
     assert np.array_equal(past["transmittance"], open_sky["transmittance"])
 
 
-def test_sheets_read_their_own_rows():
-    """A picture of several sheets: the scene of each row is its own."""
+def test_strips_read_their_own_rows():
+    """A picture of several strips: the scene of each row is its own."""
     params = nubis.Params().with_(**{"clouds.coverage": 0.0, "high_clouds.coverage": 0.0})
-    size = 2048, 700  # sheets of a million pixels
+    size = 2048, 700  # strips of a million pixels
     ours = nubis.Renderer(*size, quality="draft")
     color = np.zeros((size[1], size[0], 3), dtype=np.float32)
     color[...] = np.arange(size[1])[:, None, None] + np.arange(size[0])[:, None] / 4096
@@ -283,7 +283,7 @@ def test_an_edge_that_moves_leaves_no_ghost(background):
         ghost = ours.render(*CLOUDY, background=background, scene_depth=scenes[i - 1])
         if changed.any():
             assert np.abs(ghost[changed] - still[changed]).max() > 0.2
-        # What has not changed is clamped to what is marched around it, here on a coarse lattice.
+        # What has not changed is clamped to what is marched around it, here on a coarse grid.
         assert ref64.relative_rmse(frame, still) < 0.1
 
 

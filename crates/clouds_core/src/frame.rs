@@ -1,5 +1,5 @@
-//! What the renderer knows about a frame and its user does not set. Everything that would lose its digits in f32 (planet radii,
-//! long times, distant eyes) is worked out here in f64.
+//! Frame: quantities of a picture derived from camera, parameters and time. Those that would lose their digits in f32
+//! (planet radii, long times, distant eyes) are computed here in f64.
 
 use std::f32::consts::PI;
 use std::f64::consts::{FRAC_PI_2, PI as PI64};
@@ -18,79 +18,83 @@ use crate::shared::constants;
 use crate::uniforms::{Dispatch, Sky, View, uniform};
 use crate::wind::Advection;
 
-/// A frame of a picture or of an answer: its uniform blocks, and what its kernels are compiled for.
+/// Frame of a picture or a query: its uniform blocks, and the switches of its specialization.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Frame {
-    /// Eye, camera and planet.
+    /// Camera, eye and planet.
     pub view: View,
-    /// Sun, moon, clouds and winds.
+    /// Sun, moon, clouds and winds relative to the eye.
     pub sky: Sky,
-    /// Which pixels a dispatch is for, unless it says otherwise: all of the strip.
+    /// Range of pixels of dispatches without a range of their own: the whole strip.
     pub dispatch: Dispatch,
-    /// How the camera projects.
+    /// Projection of the camera.
     pub projection: Projection,
-    /// Which pixels hold a sample of the clouds.
+    /// Sample grid of the clouds.
     pub(crate) grid: SampleGrid,
-    /// There are high clouds.
+    /// Whether there are high clouds.
     pub high_clouds: bool,
-    /// They are embossed, and the sun reaches any of them in sight.
+    /// Whether high clouds are embossed and the sun reaches any of them in sight.
     pub high_emboss: bool,
-    /// The sun is so low that it shines on each of them in its own way.
+    /// Whether the sun is so low that its irradiance differs between the high clouds in sight.
     pub high_low_sun: bool,
-    /// Nothing is marched, as there are no clouds.
+    /// Whether there are no clouds to march.
     pub cloudless: bool,
-    /// There is a scene of the user's.
+    /// Whether there is a user-supplied scene.
     pub scene: bool,
-    /// Clouds cast shadows on the ground in sight.
+    /// Whether clouds cast shadows on the visible ground.
     pub ground_shadow: bool,
-    /// Clouds cast shadows on the air in sight.
+    /// Whether clouds cast shadows on the visible air.
     pub light_shafts: bool,
 }
 
 constants! {
-    /// Altitude where the air ends, m (Hillaire 2020).
+    /// Altitude of the top of the atmosphere in m (Hillaire 2020).
     const AIR_TOP: f64 = 100_000.0;
-    /// The sun's angular radius, radians: 0.2666 degrees (IAU: 695 700 km at 1 au).
+    /// Angular radius of the sun in radians: 0.2666 degrees (IAU: 695 700 km at 1 au).
     const SUN_RADIUS: f64 = 0.004_654;
-    /// Sine of the angle to the horizon from which on the sun is seen whole, or not at all: half its width, rounded up.
+    /// Sine of the angle to the horizon beyond which the sun's disc is visible in full or not at all: its radius,
+    /// rounded up.
     const SUN_EDGE: f64 = 0.005;
-    /// How many times longer than wide streaks of rain are.
+    /// Ratio of length to width of streaks of rain.
     const RAIN_STRETCH: f64 = 12.0;
-    /// Width of clouds, as a share of the distance from one to the next (`leap_scale`).
+    /// Width of clouds as a fraction of their spacing (`leap_scale`).
     const CLOUD_WIDTH: f32 = 0.5;
-    /// Least that the chart's scale is the planet's diameter over, planet radii: nearer to the antipode of the origin,
-    /// from 172 degrees on, the chart would have no end.
+    /// Minimum denominator of the chart's scale (`chart_reach`) in planet radii. Without it the chart would be
+    /// unbounded near the antipode of the origin. The minimum is reached 172 degrees from the origin.
     const CHART_END: f64 = 0.01;
-    /// How many times larger the second read of the high clouds is than the first: no small ratio, so that they do not
-    /// repeat together.
+    /// Ratio of the tile sizes of the second and the first read of the texture of the high clouds. It is no ratio of
+    /// small integers, so that the repetitions do not coincide.
     const BROAD: f32 = 3.2;
-    /// Updates of an octave of the high clouds after which their numbers come round: all are exact in f32.
+    /// Number of updates of an octave of the high clouds after which their indices wrap. All are exact in f32.
     const UPDATES: u32 = 65_536;
-    /// Sines of the sun's height, 12 and 20 degrees, between which its light goes over from another on each of the high
-    /// clouds in sight to the same on all.
+    /// Sines of the sun's elevation, 12 and 20 degrees, between which its irradiance on the high clouds changes from a
+    /// local value to that at the eye.
     const LOW_SUN: [f64; 2] = [0.208, 0.342];
 }
 
-/// What the sun's half width and f32 may add to its height, radians.
+/// Margin on the elevation of the sun's centre in radians, for the radius of its disc and for rounding to f32.
 const HALF_SUN: f64 = SUN_EDGE + 0.001;
 
-/// By how many tiles of the smaller map a value of 1 bends it. Measured on the default sky, whose clouds stand 5 km apart: the
-/// tiles next to each other are bent apart by more than that nearly everywhere.
+/// Displacement of the weather map by a value of 1 in the large-scale weather map, in tiles of the weather map.
+/// Measured on the default sky, whose clouds are 5 km apart: the relative displacement of adjacent tiles is larger
+/// nearly everywhere.
 const BEND: f32 = 0.8;
-/// The steepest that a baked value changes, for each width of the map.
+/// Maximum slope of the displacement in a baked large-scale weather map, per width of the map.
 const STEEPEST: f64 = 40.0;
 
-/// Speed of falling rain, m/s: of drops of 2.5 mm (Gunn and Kinzer 1949).
+/// Fall speed of rain in m/s: that of drops of 2.5 mm (Gunn and Kinzer 1949).
 const RAIN_SPEED: f64 = 7.4;
 
-/// Widest pixel that sees the glow around the sun as it is in its middle, radians: a seventh of the half width of the forward
-/// peak of aerosol (g = 0.8), with which the mean differs by 0.5 % where it is brightest.
-const GLOW: f32 = 0.032;
-/// Most directions, across and down, for the sky and for the phase function.
-const MOST_SKY: f32 = 12.0;
-const MOST_PHASE: f32 = 64.0;
+/// Maximum width in radians of a pixel whose centre represents the glow around the sun: a seventh of the half width of
+/// the forward peak of aerosol (g = 0.8). At that width the mean over the pixel differs by 0.5 % where the glow is
+/// brightest.
+const MAX_GLOW_WIDTH: f32 = 0.032;
+/// Maximum number of directions per axis over which the sky and the phase function are averaged in a pixel.
+const MAX_SKY_SAMPLES: f32 = 12.0;
+const MAX_PHASE_SAMPLES: f32 = 64.0;
 
-/// The parameters of the phase function of droplets of 5 to 50 µm diameter (Jendersie and d'Eon 2023, equations 4 to 7).
+/// Fit to the phase function of droplets of 5 to 50 µm diameter: g of the Henyey-Greenstein lobe, g and alpha of the
+/// Draine lobe, weight of the Draine lobe (Jendersie and d'Eon 2023, equations 4 to 7).
 fn droplet(diameter: f64) -> [f64; 4] {
     [
         (-0.099_056_7 / (diameter - 1.671_54)).exp(),
@@ -100,7 +104,7 @@ fn droplet(diameter: f64) -> [f64; 4] {
     ]
 }
 
-/// The half width of the narrowest peak of the phase function of clouds, radians.
+/// Half width in radians of the narrowest peak of the phase function of clouds.
 fn phase_width(params: &Params) -> f32 {
     let light = &params.light;
     let peak = |g: f32| (1.0 - g.abs()) / g.abs().max(1e-3).sqrt();
@@ -110,32 +114,33 @@ fn phase_width(params: &Params) -> f32 {
         }
         Phase::HenyeyGreenstein => peak(light.g),
         Phase::Droplet => peak(droplet(f64::from(light.droplet_diameter))[0] as f32),
-        // Half a ring of the glory, or of the aureole: light of 0.55 µm on a disc as wide as the droplet.
+        // Half the width of a ring of the glory or the aureole: diffraction of light of 0.55 µm by a disc of the
+        // droplet's diameter.
         Phase::Mie => 0.5 * 0.55 / light.droplet_diameter,
     }
 }
 
-/// The fractional part of `v / period`, in f64: f32 coordinates would be metres off after a week of wind.
+/// Fractional part of `v / period`, in f64: coordinates in f32 would be off by metres after a week of wind.
 fn wrap(v: f64, period: f32) -> f32 {
     let fraction = (v / f64::from(period)).rem_euclid(1.0) as f32;
-    // Rounding to f32 may give 1.0, which is 0; and a way too long for f64 has no fraction.
+    // Rounding to f32 may give 1, which is equivalent to 0. Displacements beyond the range of f64 give NaN.
     if fraction < 1.0 { fraction } else { 0.0 }
 }
 
-/// Where `v` is on a weather map that is `extent` wide, from 0 to 1 across it, in f64 as `wrap`.
+/// Coordinate of `v` on a weather map of width `extent`, from 0 to 1 across the map, in f64 as in `wrap`.
 fn on_map(v: f64, extent: f32, edge: Edge) -> f32 {
     match edge {
         Edge::Repeat => wrap(v, extent),
-        // A map and its mirror image repeat together.
+        // A map and its mirror image have a period of two widths.
         Edge::Mirror => 2.0 * wrap(0.5 * v, extent),
-        // So far away that f32 does not tell where, no map is in sight; and a way too long for f64 leads nowhere.
+        // Displacements beyond the range of f64 give NaN. At distances that f32 cannot resolve no map is in sight.
         Edge::Clamp if v.is_nan() => 0.0,
         Edge::Clamp => (v / f64::from(extent)).clamp(-1e12, 1e12) as f32,
     }
 }
 
-/// Altitude of the highest marched clouds, m: for the user's grid of its highest corner.
-fn highest(params: &Params) -> f64 {
+/// Altitude in m of the top of the marched clouds; of the user's grid that of its highest corner.
+fn cloud_top(params: &Params) -> f64 {
     let Some(volume) = &params.volume else { return f64::from(params.shell()[1]) };
     let [low, high] = volume.bounds();
     let radius = f64::from(params.atmosphere.planet_radius);
@@ -143,9 +148,10 @@ fn highest(params: &Params) -> f64 {
     DVec3::new(far.x, far.y, high.z + radius).length() - radius
 }
 
-/// The distance between features of the noise and of each weather; so short where the cover may go from nothing to all of it
-/// within a texel of the user's map that leaps by a fifth of it reach half a texel. Measured, islands of a texel: a whole one
-/// loses half as many again as big steps do.
+/// Shortest scale of variation of the base shape in m: of the noise and of each weather. In a user's map the cover may
+/// change from 0 to 1 within a texel, and the scale is 2.5 texels: leaps by a fifth of it (`quality.leap`) reach half a
+/// texel. Measured on islands of one texel: leaps by a whole texel miss one and a half times as many islands as
+/// coarse steps do.
 fn leap_scale(params: &Params) -> f32 {
     let of_weather = |(weather, _): (params::Weather, f32)| match &weather.map {
         Some(map) => 2.5 * weather.extent / map.width.max(map.height) as f32,
@@ -154,25 +160,25 @@ fn leap_scale(params: &Params) -> f32 {
     params.weather_shares().into_iter().map(of_weather).fold(params.clouds.shape_scale, f32::min)
 }
 
-/// What the scale of the chart at a point is the planet's diameter over, m (chart.wgsl).
+/// Denominator of the chart's scale at a point in m: the scale is the planet's diameter divided by it (chart.wgsl).
 fn chart_reach(at: DVec3, radius: f64) -> f64 {
     let from_centre = at + DVec3::Z * radius;
     (from_centre.length() + from_centre.z).max(CHART_END * radius)
 }
 
-/// Where a point lies on the chart of weather and noises, m east and north of the origin (chart.wgsl).
+/// Projection of a point to the chart of weather and noises: east and north of the origin in m (chart.wgsl).
 fn on_chart(at: DVec3, params: &Params) -> DVec2 {
     let radius = f64::from(params.atmosphere.planet_radius);
     2.0 * radius / chart_reach(at, radius) * at.truncate()
 }
 
 impl Frame {
-    /// Its uniform blocks.
+    /// Bindings of the uniform blocks, by name.
     pub(crate) fn bindings(&self, gpu: &Gpu) -> [(&'static str, Binding); 2] {
         [("frame", uniform(&[&self.view, &self.sky])), self.dispatch.binding(gpu)]
     }
 
-    /// What the camera and the size of a picture say of it.
+    /// Frame of a camera and a picture size in pixels, without a sky.
     pub fn seen_by(camera: &Camera, [width, height]: [u32; 2]) -> Self {
         let mut frame = Self::default();
         [frame.view.width, frame.view.height] = [width, height];
@@ -182,7 +188,7 @@ impl Frame {
         frame
     }
 
-    /// The frame of a picture of `size` pixels seen by `camera` at `time` seconds.
+    /// Frame of a picture of `size` pixels by `camera` at `time` in s.
     pub fn new(camera: &Camera, params: &Params, time: f64, size: [u32; 2]) -> Self {
         let mut frame = Self::seen_by(camera, size);
         frame.set_planet(camera.eye, params);
@@ -202,12 +208,12 @@ impl Frame {
         frame
     }
 
-    /// Angle between marched pixels in the middle of the picture, radians.
+    /// Angle in radians between marched pixels at the centre of the picture.
     pub fn marched_angle(&self) -> f32 {
         self.pixel_angle() * self.dispatch.stride as f32
     }
 
-    /// Width of a pixel there, radians (`pixel_width` of camera.wgsl).
+    /// Angular width in radians of a pixel at the centre of the picture (`pixel_width` of camera.wgsl).
     fn pixel_angle(&self) -> f32 {
         match self.projection {
             Projection::Equirect => (2.0 * PI / self.view.width as f32).max(PI / self.view.height as f32),
@@ -216,17 +222,17 @@ impl Frame {
         }
     }
 
-    /// Left, top, right and bottom of a part of the picture that holds a disc in a direction, of a radius in radians; empty where
-    /// it is not in the picture.
+    /// Bounding box of a disc in a direction: left, top, right and bottom in pixels. The radius is in radians. The box
+    /// may exceed the sides of a panorama, and is empty if the disc is outside the picture.
     fn disc_bounds(&self, camera: &Camera, direction: DVec3, radius: f64) -> [f32; 4] {
         let (width, height) = (f64::from(self.view.width), f64::from(self.view.height));
         let [x, y, z] = [camera.right, camera.up, camera.forward].map(|axis| direction.dot(axis));
-        // With room for what f32 makes of it.
+        // Margin for rounding to f32.
         let radius = 1.02 * radius;
         let (across, down) = match camera.projection {
             Projection::Equirect => {
                 let latitude = y.clamp(-1.0, 1.0).asin();
-                // Around a pole it is everywhere.
+                // A disc that contains a pole extends over all longitudes.
                 let over = latitude.abs() + radius >= FRAC_PI_2;
                 let half = if over { PI64 } else { (radius.sin() / latitude.cos()).min(1.0).asin() };
                 let middle = x.atan2(z);
@@ -239,7 +245,8 @@ impl Frame {
                 let (angle, rim) = (sine.atan2(z), 0.5 * camera.fov.to_radians());
                 let outer = angle + radius;
                 let scale = 0.5 * width.min(height) / rim;
-                // Away from the axis what is round is wide, and opposite it everywhere.
+                // The projection stretches a disc along the rim; opposite to the axis the disc extends over the whole
+                // rim.
                 let half =
                     if outer < 3.1 { radius * scale * (outer / outer.sin()).max(1.0) } else { 2.0 * width.max(height) };
                 let seen = if angle - radius <= rim { half } else { f64::NEG_INFINITY };
@@ -247,7 +254,7 @@ impl Frame {
                 ([middle.x - seen, middle.x + seen], [middle.y - seen, middle.y + seen])
             }
             Projection::Perspective => {
-                // The planes through the eye and an axis of the picture that touch the disc.
+                // Tangent planes of the disc through the eye and an axis of the picture.
                 let along = |side: f64, half: f64, size: f64| {
                     let reach = radius.sin() / side.hypot(z).max(1e-12);
                     let turn = if reach < 1.0 { reach.asin() } else { FRAC_PI_2 };
@@ -268,7 +275,7 @@ impl Frame {
         [left, top, right, bottom]
     }
 
-    /// What is seen of the moon.
+    /// Sets direction, irradiance, phase and bounding box of a visible moon.
     fn set_moon(&mut self, camera: &Camera, params: &Params) {
         if !params.moon.visible || !params.moon.exists() {
             return;
@@ -284,12 +291,13 @@ impl Frame {
         self.sky.moon_phase = params.moon.phase_angle().cos() as f32;
     }
 
-    /// Height over the level at the eye, degrees.
+    /// Elevation of a direction above the horizontal plane at the eye, degrees.
     pub(crate) fn height_of(&self, direction: DVec3) -> f64 {
         Vec3::from_array(self.view.zenith).as_dvec3().dot(direction).clamp(-1.0, 1.0).asin().to_degrees()
     }
 
-    /// The pixels of the sheet that discs of light are drawn in: first column, first row, columns, rows.
+    /// Ranges of pixels of the strip that contain the discs of sun and moon: first column, first row, number of
+    /// columns, number of rows.
     pub(crate) fn disc_pixels(&self, params: &Params) -> Vec<[u32; 4]> {
         let mut found = Vec::new();
         let shown = params.sun.visible && params.sun.irradiance != [0.0; 3];
@@ -307,24 +315,24 @@ impl Frame {
         found
     }
 
-    /// How finely wide pixels look at what is narrower than they are.
+    /// Sets the numbers of directions that sample features narrower than a pixel: glow of the sky, phase function.
     fn set_samples(&mut self, params: &Params) {
         let pixel = self.pixel_angle();
-        self.view.sky_samples = (pixel / GLOW).ceil().clamp(1.0, MOST_SKY) as u32;
+        self.view.sky_samples = (pixel / MAX_GLOW_WIDTH).ceil().clamp(1.0, MAX_SKY_SAMPLES) as u32;
         let narrow = phase_width(params);
         let samples = if pixel > 0.4 * narrow { (pixel / (0.2 * narrow)).ceil() } else { 1.0 };
-        self.view.phase_samples = samples.clamp(1.0, MOST_PHASE) as u32;
+        self.view.phase_samples = samples.clamp(1.0, MAX_PHASE_SAMPLES) as u32;
     }
 
-    /// Whether pixels that look down on the clouds may be wider than those are (subrays.wgsl).
+    /// Whether pixels that see the clouds from above may be wider than clouds (subrays.wgsl).
     pub fn has_subrays(&self) -> bool {
-        // The farthest of them that the eye can see.
+        // Distance to the horizon of the cloud tops, the farthest visible clouds.
         let away = self.view.power_top.max(0.0).sqrt();
         let pixel = self.pixel_angle() * self.grid.spacing() as f32;
         self.view.altitude > self.sky.shell_top && away * pixel > CLOUD_WIDTH * self.sky.leap_scale
     }
 
-    /// The frame whose dispatches march every sample of the strip.
+    /// Frame whose dispatches march every sample of the strip.
     pub fn at_samples(&self) -> Self {
         let spacing = self.grid.spacing();
         let [march_width, strip_rows] = self.grid.strip(self.dispatch.strip_rows).samples();
@@ -333,7 +341,8 @@ impl Frame {
         Self { dispatch, ..self.clone() }
     }
 
-    /// The frame whose dispatches march one sample of each cell of temporal reprojection: the frame `index` since the last cut.
+    /// Frame whose dispatches march one sample of each cell of temporal reprojection. `index` counts frames since the
+    /// last cut.
     pub fn at_rays(&self, index: u32) -> Self {
         let stride = self.grid.stride() * self.grid.spacing();
         let [subpixel_x, subpixel_y] = self.grid.subpixel(index);
@@ -342,35 +351,37 @@ impl Frame {
         Self { dispatch, ..self.clone() }
     }
 
-    /// Whether the sun can reach the clouds: false only where `sky_light` is none (passes/sky.wgsl, atmosphere.wgsl).
+    /// Whether the sun can reach the clouds. False implies that `sky_light` has no sunlight (passes/sky.wgsl,
+    /// atmosphere.wgsl).
     pub fn sunlit(&self, params: &Params) -> bool {
         if params.atmosphere.enabled {
-            return self.sun_above(params, highest(params));
+            return self.sun_above(params, cloud_top(params));
         }
-        // Where `sky_light` is worked out; one light for all marched clouds.
+        // Altitude at which `sky_light` is baked: all marched clouds have one irradiance.
         let height = f64::from(0.5 * (params.clouds.base + params.clouds.top));
         let radius = f64::from(params.atmosphere.planet_radius);
         let horizon = -(1.0 - (radius / (radius + height)).powi(2)).max(0.0).sqrt();
         let cosine = Vec3::from_array(self.view.zenith).dot(Vec3::from_array(self.sky.sun_direction));
-        // The sun's half degree, and what f32 may be off.
+        // Margins for the sun's disc and for rounding to f32.
         f64::from(cosine) - horizon > -SUN_EDGE - 1e-5 && params.sun.irradiance != [0.0; 3]
     }
 
-    /// Whether clouds cast shadows on the ground that `camera` sees.
+    /// Whether clouds cast shadows on the ground visible to `camera`.
     pub fn has_ground_shadow(&self, camera: &Camera, params: &Params) -> bool {
         let clouds = params.has_clouds() || params.has_high_clouds();
         let air = &params.atmosphere;
-        // As far around the planet as the horizon is, the sun stands higher by as much.
+        // The sun's elevation at the horizon is higher than at the eye by at most the dip, the angle between them
+        // around the planet.
         let sine = f64::from(Vec3::from_array(self.view.zenith).dot(Vec3::from_array(self.sky.sun_direction)));
         let up = sine.clamp(-1.0, 1.0).asin() > -f64::from(self.view.horizon_dip) - HALF_SUN;
         let lit = up && params.sun.irradiance != [0.0; 3] && air.ground_albedo != [0.0; 3];
         air.ground_shadows && clouds && lit && self.sees_below(camera, self.view.horizon_dip.into())
     }
 
-    /// Whether clouds cast shadows on the air that `camera` sees.
+    /// Whether clouds cast shadows on the air visible to `camera`.
     pub fn has_light_shafts(&self, camera: &Camera, params: &Params) -> bool {
         let air = &params.atmosphere;
-        let top = highest(params);
+        let top = cloud_top(params);
         let radius = f64::from(air.planet_radius);
         let dip = ((radius + top) / (radius + f64::from(self.view.altitude)).max(1.0)).min(1.0).acos();
         let inside = f64::from(self.view.altitude) <= top;
@@ -378,7 +389,8 @@ impl Frame {
         air.beams && air.enabled && params.has_clouds() && lit && (inside || self.sees_below(camera, dip))
     }
 
-    /// Whether any ray of a picture goes below a horizon at an angle under the level, or within half a degree of it.
+    /// Whether any ray of the picture goes below a horizon, with a margin of half a degree. `dip` is the depression of
+    /// the horizon below the horizontal in radians.
     fn sees_below(&self, camera: &Camera, dip: f64) -> bool {
         let down = -Vec3::from_array(self.view.zenith).as_dvec3();
         let horizon = FRAC_PI_2 - dip + 0.01;
@@ -393,41 +405,42 @@ impl Frame {
         let wide = half * f64::from(self.view.width) / f64::from(self.view.height);
         let ray = |x: f64, y: f64| camera.forward + x * wide * camera.right + y * half * camera.up;
         let steps = || (0..=32).map(|i| f64::from(i) / 16.0 - 1.0);
-        // Straight down is in the picture, or the lowest ray is on its rim.
+        // The nadir is in the picture, or the lowest ray is at its border.
         let ahead = camera.forward.dot(down);
         let nadir = [camera.right.dot(down) / wide, camera.up.dot(down) / half];
         (ahead > 0.0 && nadir.iter().all(|v| v.abs() <= ahead))
             || steps().any(|s| [ray(s, -1.0), ray(s, 1.0), ray(-1.0, s), ray(1.0, s)].into_iter().any(below))
     }
 
-    /// What the sun asks of the high clouds.
+    /// Sets the switches of sunlight on the high clouds.
     fn set_high_sun(&mut self, params: &Params) {
         let up = self.sun_above(params, f64::from(params.high_clouds.altitude));
         self.high_emboss = up && params.high_clouds.emboss > 0.0;
         self.high_low_sun = self.sun_sine() < LOW_SUN[1];
     }
 
-    /// Sine of the sun's height at the eye.
+    /// Sine of the sun's elevation at the eye.
     fn sun_sine(&self) -> f64 {
         f64::from(Vec3::from_array(self.view.zenith).dot(Vec3::from_array(self.sky.sun_direction))).clamp(-1.0, 1.0)
     }
 
-    /// Whether the sun reaches any cloud in sight up to an altitude.
+    /// Whether the sun reaches any visible cloud up to an altitude in m.
     fn sun_above(&self, params: &Params, altitude: f64) -> bool {
         let radius = f64::from(params.atmosphere.planet_radius);
         let dip = |altitude: f64| (radius / (radius + altitude.max(0.0))).acos();
-        // The farthest of them in sight is as far around the planet as the horizons of the eye and of the layer lie apart,
-        // and sees the sun until it is under a horizon of its own.
+        // The farthest visible cloud is around the planet by the dips of the eye and of the cloud together. It is lit
+        // until the sun is below its own horizon, one more dip of the cloud.
         let lowest = -(dip(f64::from(self.view.altitude)) + 2.0 * dip(altitude) + HALF_SUN);
         self.sun_sine().asin() > lowest && params.sun.irradiance != [0.0; 3]
     }
 
-    /// What the sky map is multiplied by: the deeper the sun under the horizon, the more, as dusk loses a factor of two or
-    /// more with every degree, to the 18th and, as then the night is what is seen, beyond.
+    /// Sets the factor on the texels of the sky-view LUT. It grows with the depression of the sun below the horizon, as
+    /// dusk loses a factor of two or more per degree down to 18 degrees. It grows beyond, where only the night sky is
+    /// visible.
     fn set_sky_scale(&mut self, params: &Params) {
         let depth = -self.sun_sine().asin().to_degrees() - f64::from(self.view.horizon_dip).to_degrees();
         self.sky.sky_scale = (1024.0 * (0.75 * depth.clamp(0.0, 40.0)).exp2()) as f32;
-        // Where the night outshines all that the sun may give, it is 1000 in the map.
+        // A night sky that outshines all sunlight has texels of 1000.
         let unit = |sun: f32, night: f32| sun.max(1e-3 * self.sky.sky_scale * night).max(1e-30);
         self.sky.sky_unit = std::array::from_fn(|i| unit(params.sun.irradiance[i], params.atmosphere.night[i]));
     }
@@ -442,7 +455,7 @@ impl Frame {
         self.view.forward = camera.forward.as_vec3().to_array();
     }
 
-    /// Puts the planet under an eye.
+    /// Sets the position of an eye relative to the planet, its cloud layers and its atmosphere.
     pub(crate) fn set_planet(&mut self, eye: DVec3, params: &Params) {
         let radius = f64::from(params.atmosphere.planet_radius);
         let from_centre = eye + DVec3::Z * radius;
@@ -456,7 +469,8 @@ impl Frame {
         self.view.chart_reach = reach as f32;
         self.view.chart_slope = (eye.truncate() / reach).as_vec2().to_array();
         self.view.horizon_dip = (radius / (radius + h.max(0.0))).acos() as f32;
-        // An eye under the ground is on it: were the ground to hide nothing from there, it would vanish at z = 0.
+        // An eye below the ground counts as on it. Otherwise the ground would hide nothing from there, and would vanish
+        // at z = 0.
         self.view.power_ground = power(0.0).max(0.0);
         [self.sky.shell_base, self.sky.shell_top] = params.shell();
         self.sky.lower_top = params.lower_top();
@@ -464,8 +478,9 @@ impl Frame {
         self.sky.rain_reach = params.rain_reach();
         self.view.power_base = power(f64::from(self.sky.shell_base));
         self.view.power_top = power(f64::from(self.sky.shell_top));
-        // The air that they shade: from where the eye is nearest to it to where the last of it goes under the horizon.
-        let top = highest(params);
+        // Range of distances of shaded air: from the nearest point of the sphere of the cloud tops to where that sphere
+        // sinks below the horizon.
+        let top = cloud_top(params);
         self.view.power_shade = power(top);
         let tangent = |altitude: f64| (altitude.max(0.0) * (2.0 * radius + altitude)).sqrt();
         self.view.shaft_start = (h - top).max(0.0) as f32;
@@ -474,15 +489,16 @@ impl Frame {
         self.view.power_air = power(AIR_TOP);
     }
 
+    /// Sets the extinction of the clouds and the bounds of the user's grid.
     fn set_volume(&mut self, eye: DVec3, params: &Params) {
         let Some(volume) = &params.volume else {
             let upper = if params.has_upper_clouds() { params.upper_clouds.extinction } else { 0.0 };
             let rain = if params.has_rain_shafts() { params.clouds.rain_extinction } else { 0.0 };
             self.sky.extinction = params.clouds.extinction.max(upper).max(rain);
-            // No share of what is there is 0: that it is thin does not change where it is marched.
-            const LEAST: f32 = 1e-20;
+            // The relative extinction of a medium that is present is not 0: where it is marched does not depend on it.
+            const MIN_SHARE: f32 = 1e-20;
             let share = |extinction| {
-                if self.sky.extinction > 0.0 { f32::max(extinction / self.sky.extinction, LEAST) } else { 0.0 }
+                if self.sky.extinction > 0.0 { f32::max(extinction / self.sky.extinction, MIN_SHARE) } else { 0.0 }
             };
             [self.sky.share, self.sky.upper_share, self.sky.rain_share] =
                 [params.clouds.extinction, upper, rain].map(share);
@@ -497,41 +513,42 @@ impl Frame {
         self.sky.voxel = ((high - low) / voxels).min_element() as f32;
     }
 
-    /// The noises and the weather of the upper deck, which are scaled with it.
-    fn set_upper_wind(&mut self, eye: DVec2, params: &Params, carried: &Advection) {
+    /// Sets the positions of the eye in the noises and the weather of the upper deck, which have its scale.
+    fn set_upper_wind(&mut self, eye: DVec2, params: &Params, advection: &Advection) {
         let (clouds, upper) = (&params.clouds, &params.upper_clouds);
         let scale = f64::from(upper.scale);
-        let (shape, detail) = (eye - carried.upper, eye - carried.upper_detail);
+        let (shape, detail) = (eye - advection.upper, eye - advection.upper_detail);
         let plane = |at: DVec2, tile: f32| [wrap(at.x / scale, tile), wrap(at.y / scale, tile)];
         let volume = |at: DVec2, tile: f32| {
             let [x, y] = plane(at, tile);
-            [x, y, wrap(-carried.rise / scale, tile)]
+            [x, y, wrap(-advection.rise / scale, tile)]
         };
         self.sky.upper_direction = compass(f64::from(upper.direction)).as_vec2().to_array();
         self.sky.upper_shape_origin = volume(shape, clouds.shape_scale);
         self.sky.upper_detail_origin = volume(detail, clouds.detail_scale);
         self.sky.upper_curl_origin = plane(detail, clouds.curl_scale);
-        // Another part of the map, or one deck would stand on the other.
+        // An offset in the map: without it the clouds of both decks would be above one another.
         let extent = f64::from(params.weather.extent);
         let weather = shape + DVec2::new(0.37, 0.61) * extent * scale;
         let (extent, edge) = (params.weather.extent, params.weather.edge);
         self.sky.upper_weather_origin = [weather.x, -weather.y].map(|v| on_map(v / scale, extent, edge));
     }
 
+    /// Sets the positions of the eye in noises, weather and high clouds after advection.
     fn set_wind(&mut self, eye: DVec3, params: &Params, time: f64) {
         let (clouds, wind, high) = (&params.clouds, &params.wind, &params.high_clouds);
-        let carried = Advection::at(params, time);
-        let volume = |at: DVec2, scale: f32| [wrap(at.x, scale), wrap(at.y, scale), wrap(-carried.rise, scale)];
+        let advection = Advection::at(params, time);
+        let volume = |at: DVec2, scale: f32| [wrap(at.x, scale), wrap(at.y, scale), wrap(-advection.rise, scale)];
         let plane = |at: DVec2, scale: f32| [wrap(at.x, scale), wrap(at.y, scale)];
         self.sky.wind_direction = compass(f64::from(wind.direction)).as_vec2().to_array();
         let eye = on_chart(eye, params);
-        let (shape, detail) = (eye - carried.shape, eye - carried.detail);
+        let (shape, detail) = (eye - advection.shape, eye - advection.detail);
         self.sky.shape_origin = volume(shape, clouds.shape_scale);
         self.sky.detail_origin = volume(detail, clouds.detail_scale);
         self.sky.curl_origin = plane(detail, clouds.curl_scale);
 
-        // The middle of the weather map is the origin of the world, its first row the north.
-        let weather = eye - carried.weather;
+        // The centre of the weather map is the origin of the world, and row 0 is north.
+        let weather = eye - advection.weather;
         let half = 0.5 * f64::from(params.weather.extent);
         let (extent, edge) = (params.weather.extent, params.weather.edge);
         self.sky.weather_origin = [on_map(weather.x + half, extent, edge), on_map(half - weather.y, extent, edge)];
@@ -542,11 +559,11 @@ impl Frame {
         self.sky.broad_most = 0.5 * shares.total;
         self.sky.broad_scale = shares.total;
         self.sky.broad_bend = BEND * shares.bend * self.sky.broad_scale;
-        let ways = f64::from(BEND * params.weather.extent / params.weather.broad_extent);
-        self.sky.broad_stretch = (ways * STEEPEST) as f32;
+        let tiles = f64::from(BEND * params.weather.extent / params.weather.broad_extent);
+        self.sky.broad_stretch = (tiles * STEEPEST) as f32;
         let fallen = RAIN_SPEED * time / RAIN_STRETCH;
         self.sky.rain_fall = wrap(fallen, clouds.shape_scale) * clouds.shape_scale;
-        self.set_upper_wind(eye, params, &carried);
+        self.set_upper_wind(eye, params, &advection);
 
         let (spot, radius) = params.clear_spot();
         self.sky.clear_at = (DVec2::from_array(spot) - eye).as_vec2().to_array();
@@ -554,12 +571,12 @@ impl Frame {
 
         let along = compass(f64::from(high.direction));
         let across = DVec2::new(-along.y, along.x);
-        let at = DVec2::new(eye.dot(along), eye.dot(across)) - carried.high;
+        let at = DVec2::new(eye.dot(along), eye.dot(across)) - advection.high;
         self.sky.high_origin = plane(at, high.scale);
         self.sky.high_broad_origin = plane(at, BROAD * high.scale);
         self.sky.high_direction = along.as_vec2().to_array();
-        // In steps of a 256th of the smallest octave's life, which change no pixel by more than four thousandths: a new
-        // texture in every frame would take longer than all else that is baked.
+        // Time is quantized to steps of 1/256 of the lifetime of the smallest octave, which change no pixel by more
+        // than 0.004. A new texture in every frame would take longer than all other bakes.
         let step = 1.0 / (256.0 * f64::from(high.evolution) * f64::from(1u32 << (high.octaves - 1)));
         let time = if step.is_finite() { (time / step).round() * step } else { time };
         for octave in 0..8 {
@@ -576,8 +593,8 @@ impl Frame {
         }
     }
 
-    /// Notes what has changed since the frame before, for reprojection.
-    pub(crate) fn set_previous(&mut self, previous: &Self, eye_motion: DVec3, carried: &Advection) {
+    /// Sets the camera and the sun of the previous frame and the displacements since in m, for reprojection.
+    pub(crate) fn set_previous(&mut self, previous: &Self, eye_motion: DVec3, advection: &Advection) {
         self.view.previous_right = previous.view.right;
         self.view.previous_up = previous.view.up;
         self.view.previous_forward = previous.view.forward;
@@ -585,6 +602,6 @@ impl Frame {
         self.view.previous_half_fov = previous.view.half_fov;
         self.sky.previous_sun = previous.sky.sun_direction;
         self.view.eye_motion = eye_motion.as_vec3().to_array();
-        self.view.cloud_motion = carried.drift().as_vec3().to_array();
+        self.view.cloud_motion = advection.drift().as_vec3().to_array();
     }
 }

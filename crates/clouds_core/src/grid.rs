@@ -8,8 +8,8 @@ constants! {
     /// Spacing of samples at low resolution, and maximum spacing of the initial grid of adaptive sampling, in pixels.
     pub(crate) const TILE: u32 = 4;
 }
-/// Maximum angle between samples in radians. Clouds between rays farther apart are missed: the error of `fair_weather` is
-/// 11 % at 1.3 degrees, and 3 % at a third of a degree (contrast 0.1).
+/// Maximum angle between samples in radians. Clouds between rays farther apart are missed: the error of `fair_weather`
+/// is 11 % at 1.3 degrees, and 3 % at a third of a degree (contrast 0.1).
 pub(crate) const WIDEST: f32 = 0.5 * PI / 180.0;
 
 /// Number of frames in which an animation at full resolution marches every sample once.
@@ -53,8 +53,8 @@ impl SampleGrid {
 
     /// Offset in pixels of the sample of a cell that frame `index` marches.
     pub fn subpixel(&self, index: u32) -> [u32; 2] {
-        // The first four entries are the corners of the cell's quarters: a cell at low resolution has these four samples
-        // alone, TILE pixels apart.
+        // The first four entries are the corners of the cell's quarters: a cell at low resolution has these four
+        // samples alone, TILE pixels apart.
         let scale = if self.low_resolution { 2 } else { 1 };
         ORDER[(index % self.cycle()) as usize].map(|place| scale * place)
     }
@@ -65,8 +65,8 @@ impl SampleGrid {
     }
 }
 
-/// Order in which the sixteen samples of a cell are marched, as offsets in the cell: a Bayer matrix, so that consecutive
-/// samples are distributed over the cell.
+/// Order in which the sixteen samples of a cell are marched, as offsets in the cell: a Bayer matrix, so that
+/// consecutive samples are distributed over the cell.
 const ORDER: [[u32; 2]; 16] = [
     [0, 0],
     [2, 2],

@@ -48,7 +48,8 @@ impl Past {
         !self.is_cut(shot) && self.frame.cloudless == cloudless && (self.is_bare(shot.scene.is_some()) || same_size)
     }
 
-    /// Whether neither frame has a user's scene. Only then may the sample grids differ: resampling would blur its edges.
+    /// Whether neither frame has a user's scene. Only then may their sample grids differ: edges of a scene are found by
+    /// comparing pixels of one grid (reproject.wgsl).
     pub fn is_bare(&self, scene: bool) -> bool {
         self.scene.is_none() && !scene
     }
@@ -137,8 +138,8 @@ impl Frame {
     }
 }
 
-/// Uploads the user's scene of a strip and, in an animation, that of the previous frame. A frame without a scene has one
-/// at an infinite distance.
+/// Uploads the user's scene of a strip and, in an animation, that of the previous frame. A frame without a scene has
+/// one at an infinite distance.
 pub(crate) fn upload_scenes(
     textures: &SceneTextures,
     temporal: Option<&mut Temporal>,

@@ -38,9 +38,10 @@ pub(crate) fn download(rec: &mut Recorder<'_>, frame: &Frame, targets: &Targets,
 }
 
 impl Picture {
-    /// Appends the readback of a strip.
+    /// Appends the readback of a strip; there is none of a frame on a screen.
     pub(crate) fn append(&mut self, downloads: &[Download], frame: &Frame, layers: bool) {
-        self.image.extend_from_slice(downloads[0].numbers());
+        let Some(image) = downloads.first() else { return };
+        self.image.extend_from_slice(image.numbers());
         if !layers {
             return;
         }

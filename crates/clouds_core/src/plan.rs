@@ -14,7 +14,7 @@ use crate::shot::Shot;
 use crate::specialization;
 
 impl Integrator {
-    /// Whether the march has no clouds in a sky. The other integrators trace every sky.
+    /// Whether nothing is integrated: a sky without clouds, by the march. The other integrators run on every sky.
     pub(crate) fn is_cloudless(self, params: &Params) -> bool {
         self == Self::March && !params.has_clouds()
     }
@@ -23,8 +23,8 @@ impl Integrator {
 /// Target of a frame.
 #[derive(Clone, Copy)]
 pub(crate) enum Target<'a> {
-    /// Still. `layers`: background, depth and statistics are outputs too. `first_sample`: index of the first path of each
-    /// pixel.
+    /// Still. `layers`: background, depth and statistics are outputs too. `first_sample`: index of the first path of
+    /// each pixel.
     Still { layers: bool, first_sample: u32 },
     /// Next frame of an animation, to a screen or, without one, to memory.
     Animation(Option<&'a Screen>),
@@ -96,8 +96,8 @@ impl Plan {
         Inputs { params, quality, frame, eye: shot.camera.eye, time: shot.time, specialization }
     }
 
-    /// Number of rows in the buffers of a strip: its own and, with adaptive sampling, the first row of the next strip, whose
-    /// samples both strips use.
+    /// Number of rows in the buffers of a strip: its own and, with adaptive sampling, the first row of the next strip,
+    /// whose samples both strips use.
     fn rows(&self, strip: &Range<u32>) -> u32 {
         strip.len() as u32 + u32::from(self.adaptive && strip.end < self.height)
     }

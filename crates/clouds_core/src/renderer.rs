@@ -22,8 +22,8 @@ use crate::shot::{Shot, check_size};
 use crate::targets::{Targets, count};
 use crate::wind::Going;
 
-/// History length of a pixel that has been sampled directly ([`Renderer::history_length`]): the number of frames in which
-/// an animation marches every pixel once.
+/// History length of a pixel that has been sampled directly ([`Renderer::history_length`]): the number of frames in
+/// which an animation marches every pixel once.
 pub const CYCLE: u32 = grid::CYCLE;
 
 /// Renderer of pictures of one size and quality on one device.
@@ -54,7 +54,7 @@ impl Renderer {
     pub fn new(width: u32, height: u32, quality: Quality, adapter: Option<&str>) -> Result<Self> {
         quality.check()?;
         check_size([width, height])?;
-        // Both take about 20 ms of one thread in the first renderer of a process, and run in parallel.
+        // Blue noise and device take about 20 ms each in the first renderer of a process, and are prepared in parallel.
         let gpu = thread::scope(|scope| {
             scope.spawn(|| LazyLock::force(&blue_noise::TILE));
             Gpu::open(adapter)
@@ -83,9 +83,9 @@ impl Renderer {
 
     /// GPU memory after the last picture: owner, name of the shader variable, and size in bytes.
     ///
-    /// The owner `scene` has the inputs that do not depend on the picture's size, except `light_shafts`, which is
-    /// smaller for small pictures, and the user's scene. Its noise textures are shared by the renderers of a device.
-    /// The owners `still` and `animation` have buffers in proportion to the number of pixels.
+    /// The owner `scene` has LUTs, whose sizes do not depend on the picture's. Exceptions are `light_shafts`, which is
+    /// smaller for small pictures, and the textures of the user's scene. Noise textures are shared by the renderers of
+    /// a device. The owners `still` and `animation` have buffers in proportion to the number of pixels.
     pub fn memory(&self) -> Vec<(&'static str, &'static str, u64)> {
         let mut held: Vec<_> = self.lut_memory.iter().map(|&(name, bytes)| ("scene", name, bytes)).collect();
         let still = self.still.iter().flat_map(|targets| targets.bindings()).map(|held| ("still", held));
@@ -190,8 +190,7 @@ impl Renderer {
     }
 
     /// Renders the next frame of an animation with one light source: one sample in sixteen is marched (one in four at
-    /// low resolution), the others are reprojected. The first frame, and the first after a cut, is a still. The image is
-    /// empty if it is rendered to a screen.
+    /// low resolution), the others are reprojected. The first frame, and the first after a cut, is a still.
     pub(crate) fn next_frame(
         &mut self,
         shot: &Shot<'_>,
@@ -239,9 +238,9 @@ impl Renderer {
     /// History length of each pixel of the last frame of [`Renderer::animate`] in frames, row by row.
     ///
     /// [`CYCLE`] is a pixel that was sampled directly: marched in that frame, or marched earlier and reprojected since.
-    /// Less is the number of frames since the pixel was interpolated from the rays around it; 1 was interpolated in that
-    /// frame. Empty without reprojection: before the first frame, after [`Renderer::cut`], without clouds, and with the
-    /// integrators `reference` and `path`.
+    /// Less is the number of frames since the pixel was interpolated from the rays around it; 1 was interpolated in
+    /// that frame. Empty without reprojection: before the first frame, after [`Renderer::cut`], without clouds, and
+    /// with the integrators `reference` and `path`.
     ///
     /// Returns [`Error::Fork`] in a forked child.
     pub fn history_length(&mut self) -> Result<Vec<u32>> {

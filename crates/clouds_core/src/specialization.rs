@@ -1,4 +1,5 @@
-//! Specialization tables: the values of the `override` constants that kernels are compiled for, by name.
+//! Specialization tables: values of the `override` constants, by name, and the light model that kernels are compiled
+//! with.
 
 use std::sync::Arc;
 

@@ -230,7 +230,7 @@ crate::params! {
         /// Number of marched pixels per row.
         march_width: u32 = 1;
         /// Spacing of the samples of adaptive sampling along both axes, in marched pixels (passes/refine).
-        lattice: u32 = 1;
+        grid_spacing: u32 = 1;
         /// 1 if rays search for cloud only in the range where their neighbours found it, 0 if along their full length.
         spans: u32 = 0;
         /// Worker threads among which a CPU device distributes workgroups; 1 on a GPU (workgroups.wgsl).

@@ -1,6 +1,6 @@
 // Adaptive sampling: pixels between samples of low contrast are interpolated, the others get a ray.
 //
-// Samples lie on a grid of spacing `dispatch.lattice`, to which the last column and row belong. `refine` halves the
+// Samples lie on a grid of spacing `dispatch.grid_spacing`, to which the last column and row belong. `refine` halves the
 // spacing: each new pixel of the grid is interpolated here or added to the ray list. An invocation has a square of the
 // grid and resolves its middle and the middles of its upper and left edges; neighbouring squares share edges.
 #import bindings
@@ -13,11 +13,11 @@
 @compute @workgroup_size(GRID_GROUP, GRID_GROUP)
 fn list_grid(@builtin(global_invocation_id) id: vec3u) {
     let last = vec2u(dispatch.march_width, dispatch.strip_rows) - 1u;
-    let size = (last + dispatch.lattice - 1u) / dispatch.lattice + 1u;
+    let size = (last + dispatch.grid_spacing - 1u) / dispatch.grid_spacing + 1u;
     if any(id.xy >= size) {
         return;
     }
-    let pixel = min(id.xy * dispatch.lattice, last);
+    let pixel = min(id.xy * dispatch.grid_spacing, last);
     active_rays[id.y * size.x + id.x] = pixel.y * dispatch.march_width + pixel.x;
     if all(id.xy == vec2u(0u)) {
         atomicStore(&ray_count, size.x * size.y);
@@ -27,12 +27,12 @@ fn list_grid(@builtin(global_invocation_id) id: vec3u) {
 @compute @workgroup_size(GRID_GROUP, GRID_GROUP)
 fn refine(@builtin(global_invocation_id) id: vec3u) {
     let last = vec2u(dispatch.march_width, dispatch.strip_rows) - 1u;
-    if any(id.xy > (last + dispatch.lattice - 1u) / dispatch.lattice) {
+    if any(id.xy > (last + dispatch.grid_spacing - 1u) / dispatch.grid_spacing) {
         return;
     }
-    let half = dispatch.lattice / 2u;
-    let low = min(id.xy * dispatch.lattice, last);
-    let high = min(low + dispatch.lattice, last);
+    let half = dispatch.grid_spacing / 2u;
+    let low = min(id.xy * dispatch.grid_spacing, last);
+    let high = min(low + dispatch.grid_spacing, last);
     let middle = low + half;
     let has = middle < high; // whether there is a pixel between the columns, and between the rows
     if !any(has) {
@@ -40,7 +40,7 @@ fn refine(@builtin(global_invocation_id) id: vec3u) {
     }
     // Origins of the squares above and to the left, which are narrower behind the last column and row. At the edge of
     // the picture it is the square itself.
-    let before = (max(low, vec2u(1u)) - 1u) / dispatch.lattice * dispatch.lattice;
+    let before = (max(low, vec2u(1u)) - 1u) / dispatch.grid_spacing * dispatch.grid_spacing;
 
     let a = read(low);
     let b = read(vec2u(high.x, low.y));

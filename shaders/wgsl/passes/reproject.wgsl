@@ -361,7 +361,7 @@ fn begin(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= size) {
         return;
     }
-    let on_grid = (id.xy % dispatch.lattice == vec2u(0u)) | (id.xy == size - 1u);
+    let on_grid = (id.xy % dispatch.grid_spacing == vec2u(0u)) | (id.xy == size - 1u);
     followed[id.y * size.x + id.x] = select(CYCLE - 1u, CYCLE, all(on_grid));
 }
 

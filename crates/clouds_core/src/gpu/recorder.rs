@@ -98,8 +98,8 @@ pub(crate) struct Recorder<'a> {
     condition: Option<wgpu::Buffer>,
     steps: Vec<Step>,
     arguments: u32,
-    /// Kernels that later recordings may request.
-    ahead: Vec<PipelineRequest>,
+    /// Empty dispatches of kernels that later recordings may request.
+    ahead: Vec<Step>,
     downloads: Vec<Download>,
     received: Vec<(usize, ReadbackHandler)>,
     token: Token,
@@ -254,12 +254,18 @@ impl<'a> Recorder<'a> {
         self.steps.push(Step::Dispatch { which, bindings, extent });
     }
 
-    /// Records work that is not run: only its kernels are compiled, ahead of the next picture.
+    /// Records work of the next picture whose kernels are compiled now. Its dispatches are empty: lavapipe (Mesa 22.3)
+    /// compiles a kernel at its first dispatch.
     pub fn compile_ahead(&mut self, record: impl FnOnce(&mut Self)) {
-        let (steps, arguments) = (mem::take(&mut self.steps), self.arguments);
+        let steps = mem::take(&mut self.steps);
         record(self);
-        self.ahead.extend(pipeline_requests(&self.steps));
-        (self.steps, self.arguments) = (steps, arguments);
+        let ahead = mem::replace(&mut self.steps, steps);
+        self.ahead.extend(ahead.into_iter().filter_map(|step| match step {
+            Step::Dispatch { which, bindings, .. } => {
+                Some(Step::Dispatch { which, bindings, extent: Extent::Grid([0; 3]) })
+            }
+            _ => None,
+        }));
     }
 
     /// Fills a buffer with zeros.
@@ -304,13 +310,15 @@ impl<'a> Recorder<'a> {
     /// Runs the recording as [`Recorder::submit`]; further work can be recorded.
     pub fn flush(&mut self) -> Result<Vec<Download>> {
         (self.interrupt)()?;
-        let steps = mem::take(&mut self.steps);
+        let mut steps = mem::take(&mut self.steps);
+        steps.append(&mut self.ahead);
         let token = mem::take(&mut self.token);
         let mut downloads = mem::take(&mut self.downloads);
         let arguments = mem::take(&mut self.arguments);
         let mut submission = Submission::new(self.gpu, &steps, arguments, self.interrupt);
-        let wanted = pipeline_requests(&steps).into_iter().chain(mem::take(&mut self.ahead));
-        while_compiling(self.gpu, wanted, || steps.iter().try_for_each(|step| submission.encode(step)))?;
+        while_compiling(self.gpu, pipeline_requests(&steps), || {
+            steps.iter().try_for_each(|step| submission.encode(step))
+        })?;
         submission.finish(&mut downloads, self.timings)?;
         token.0.store(true, Ordering::Relaxed);
         // From the last to the first, so that indices stay valid.
@@ -331,11 +339,7 @@ fn pipeline_requests(steps: &[Step]) -> Vec<PipelineRequest> {
 }
 
 /// Runs `work` while other threads compile kernels.
-fn while_compiling<T>(
-    gpu: &Gpu,
-    wanted: impl Iterator<Item = PipelineRequest>,
-    work: impl FnOnce() -> Result<T>,
-) -> Result<T> {
+fn while_compiling<T>(gpu: &Gpu, wanted: Vec<PipelineRequest>, work: impl FnOnce() -> Result<T>) -> Result<T> {
     let mut missing: Vec<PipelineRequest> = Vec::new();
     for (name, specialization) in wanted {
         let same = |(requested, table): &PipelineRequest| *requested == name && *table == specialization;
@@ -478,7 +482,8 @@ impl<'a> Submission<'a> {
         };
         let group = kernel.bind(self.gpu, bindings, &resources)?;
         let number = self.dispatched.len();
-        let queries = self.queries.as_ref().filter(|_| number < MAX_TIMED);
+        let empty = matches!(extent, Extent::Grid([0, ..]));
+        let queries = self.queries.as_ref().filter(|_| number < MAX_TIMED && !empty);
         let timestamp_writes = queries.map(|query_set| wgpu::ComputePassTimestampWrites {
             query_set,
             beginning_of_pass_write_index: Some(2 * number as u32),
@@ -498,7 +503,9 @@ impl<'a> Submission<'a> {
             }
         }
         drop(pass);
-        self.dispatched.push((kernel, extent));
+        if !empty {
+            self.dispatched.push((kernel, extent));
+        }
         Ok(())
     }
 

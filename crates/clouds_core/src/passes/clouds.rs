@@ -1,14 +1,14 @@
-//! The clouds of each pixel: what `march`, `reference` and `path` make and `reproject` and `composite` read.
+//! Buffers of the marched clouds: output of `march`, `reference` and `path`, input of `reproject` and `composite`.
 
 use crate::gpu::{Bindings, Gpu};
 
-/// What the march makes of each pixel of a sheet or of a picture.
+/// Clouds by sample of a strip or a picture.
 pub(crate) struct CloudBuffers {
     /// Premultiplied radiance and transmittance.
     pub clouds: wgpu::Buffer,
-    /// Metres to the mean scattering point, -1 where there is none.
+    /// Distance to the mean scattering point in m, -1 without clouds.
     pub depth: wgpu::Buffer,
-    /// Density evaluations.
+    /// Number of density evaluations.
     pub samples: wgpu::Buffer,
 }
 

@@ -1,4 +1,4 @@
-//! The clouds before the sky: what the caller gets.
+//! Compositing: clouds, seen through the air, over the background.
 
 use super::clouds::CloudBuffers;
 use super::refine::RayList;
@@ -10,10 +10,10 @@ use crate::grid::{TILE, WIDEST};
 use crate::params::{Params, Quality};
 use crate::uniforms::Dispatch;
 
-/// Share of the cells that are not smooth as a rule.
-const ROUGH: f64 = 0.3;
+/// Typical fraction of cells that are not smooth, whose pixels are evaluated one by one.
+const TYPICAL_LISTED: f64 = 0.3;
 
-/// What a picture is composed of, and into.
+/// Buffers of the composite pass.
 pub(crate) struct Parts<'a> {
     pub cloud_buffers: &'a CloudBuffers,
     pub background_corners: &'a Background,
@@ -21,13 +21,13 @@ pub(crate) struct Parts<'a> {
     pub out: &'a Output,
 }
 
-/// The picture, of a band or whole.
+/// Output of a strip.
 pub(crate) struct Output {
-    /// Radiance and alpha.
+    /// Radiance and alpha, four numbers per pixel.
     pub image: wgpu::Buffer,
-    /// Radiance of the sky without clouds.
+    /// Radiance of the background without clouds, four numbers per pixel.
     pub sky: wgpu::Buffer,
-    /// Depth of all clouds, -1 where there is none.
+    /// Distance to the mean scattering point of all clouds in m, -1 without clouds.
     pub depth: wgpu::Buffer,
 }
 
@@ -45,7 +45,7 @@ impl Output {
     }
 }
 
-/// What is behind the marched clouds at the corners of the cells of a sheet, and of those around it.
+/// Background of the marched clouds at the corners of the cells of a strip and of the cells around it.
 pub(crate) struct Background {
     pub corners: wgpu::Buffer,
 }
@@ -60,19 +60,21 @@ impl Background {
     }
 }
 
+/// Number of corners, across and down: one more than cells, and one more on either side.
 fn corners(size: [u32; 2]) -> [u32; 2] {
     size.map(|pixels| pixels.div_ceil(TILE) + 3)
 }
 
-/// Whether what is behind the clouds is worked out by cells: where clouds are marched so, and cells as narrow as theirs. The
-/// high clouds are a single layer then, as they are from below.
+/// Whether the background is evaluated at corners of cells and interpolated: with adaptive sampling, if cells are no
+/// wider than its largest spacing of samples. The high clouds must be a single layer, which they are from below.
 pub(crate) fn by_cells(frame: &Frame, quality: &Quality) -> bool {
     let single = !frame.high_clouds || frame.view.power_high <= 0.0;
     quality.contrast > 0.0 && single && TILE as f32 * frame.marched_angle() / frame.dispatch.stride as f32 <= WIDEST
 }
 
-/// Composes the sheet of `frame`: cells, then the pixels of those that are not smooth, or all of them; then those in which a disc
-/// of light is seen.
+/// Composites the strip of `frame`. With `by_cells` smooth cells are interpolated, and the pixels of the others are
+/// listed and evaluated. Otherwise all pixels are evaluated. Pixels with a disc of sun or moon follow in dispatches of
+/// their own.
 pub(crate) fn record(rec: &mut Recorder<'_>, frame: &Frame, params: &Params, parts: &Parts<'_>, by_cells: bool) {
     let gpu = rec.gpu;
     let Parts { cloud_buffers, background_corners, ray_list, out } = parts;
@@ -92,7 +94,7 @@ pub(crate) fn record(rec: &mut Recorder<'_>, frame: &Frame, params: &Params, par
         rec.clear(&ray_list.count);
         let cells = [block, background_corners.bindings(), ours.clone()].concat();
         rec.dispatch(("composite", "composite_cells"), cells, [columns, rows, 1]);
-        let list = ray_list.list(columns * rows, TILE * TILE, ROUGH);
+        let list = ray_list.list(columns * rows, TILE * TILE, TYPICAL_LISTED);
         rec.dispatch_list(("composite", "composite_list"), &ours, &list, |first_ray| {
             Dispatch { first_ray, ..whole.clone() }.binding(gpu)
         });
@@ -104,10 +106,10 @@ pub(crate) fn record(rec: &mut Recorder<'_>, frame: &Frame, params: &Params, par
     }
     for [first_column, first_row, columns, rows] in frame.disc_pixels(params) {
         let pixels = Dispatch { first_column, first_row, columns, rows, ..whole.clone() };
-        let usual = rec.specialize_with(&[("DISCS", 1.0)]);
+        let previous = rec.specialize_with(&[("DISCS", 1.0)]);
         let bindings = [vec![pixels.binding(gpu)], ours.clone()].concat();
         rec.dispatch(("discs", "discs"), bindings.clone(), [columns, rows, 1]);
         rec.dispatch(("composite", "composite_discs"), bindings, [columns, rows, 1]);
-        rec.specialize(usual);
+        rec.specialize(previous);
     }
 }

@@ -1,4 +1,4 @@
-//! Pictures on their way to a window: on the device, in 8 bits.
+//! Display of pictures in a window: conversion to 8 bits on the device.
 
 use super::composite::Output;
 use crate::color::{TONE_MAPS, to_srgb8, tone_map_index};
@@ -9,7 +9,7 @@ use crate::gpu::Gpu;
 use crate::gpu::Recorder;
 use crate::uniforms::Dispatch;
 
-/// A texture of the device that a window shows: 8-bit pixels, encoded for a display.
+/// Screen texture: RGBA8 pixels on the device, encoded for a display (sRGB).
 pub struct Screen {
     texture: wgpu::Texture,
     view: wgpu::TextureView,
@@ -19,8 +19,10 @@ pub struct Screen {
 }
 
 impl Screen {
-    /// A black one of `width` by `height` pixels, for pictures with so many stops of exposure and one of
-    /// [`crate::color::TONE_MAPS`].
+    /// Black screen of `width` x `height` pixels. `exposure` is in stops, `tone_map` one of
+    /// [`TONE_MAPS`](crate::color::TONE_MAPS).
+    ///
+    /// Returns [`Error::Parameter`] for an invalid exposure or tone map.
     pub fn new(gpu: &Gpu, [width, height]: [u32; 2], exposure: f32, tone_map: &str) -> Result<Self> {
         let index = tone_map_index(exposure, tone_map)?;
         let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
@@ -47,25 +49,29 @@ impl Screen {
         [self.texture.width(), self.texture.height()]
     }
 
-    /// Stops of exposure, and the tone map.
+    /// Exposure in stops, and name of the tone map.
     pub fn look(&self) -> (f32, &'static str) {
         (self.exposure, self.tone_map)
     }
 
-    /// What a window samples.
+    /// View of the texture, for sampling.
     pub fn view(&self) -> &wgpu::TextureView {
         &self.view
     }
 
-    /// Shows a picture from memory: four numbers a pixel, row by row.
+    /// Writes a picture from memory with exposure and tone map: radiance and alpha, four numbers per pixel, row by row.
+    ///
+    /// Returns [`Error::Parameter`] for a picture of another size.
     pub fn write(&self, gpu: &Gpu, image: &[f32]) -> Result<()> {
         let width = self.size()[0] as usize;
-        // Without alpha, as the pass shows it: a window has nothing behind.
+        // Alpha is ignored, as by the pass: a window has no background to blend with.
         let image: Vec<f32> = image.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2], 1.0]).collect();
         self.write_pixels(gpu, &to_srgb8(&image, 4, width, self.exposure, self.tone_map, true)?)
     }
 
-    /// Shows pixels from memory as they are: four bytes each, row by row.
+    /// Writes encoded pixels from memory without conversion: RGBA8, four bytes per pixel, row by row.
+    ///
+    /// Returns [`Error::Parameter`] for another number of bytes.
     pub fn write_pixels(&self, gpu: &Gpu, pixels: &[u8]) -> Result<()> {
         let [width, height] = self.size();
         if pixels.len() as u64 != 4 * u64::from(width) * u64::from(height) {
@@ -81,7 +87,7 @@ impl Screen {
     }
 }
 
-/// Shows a picture.
+/// Records the conversion of a picture to a screen.
 pub(crate) fn record(rec: &mut Recorder<'_>, frame: &Frame, output: &Output, screen: &Screen) {
     let block = Dispatch { first_row: 0, rows: frame.view.height, ..frame.dispatch.clone() }.binding(rec.gpu);
     let bindings = [vec![block], output.bindings(), screen.bindings()].concat();

@@ -1,4 +1,4 @@
-//! The march through the clouds, of every pixel or of a subset.
+//! Ray march of the clouds: for all samples of a strip, by adaptive sampling, or for a ray list.
 
 use super::clouds::CloudBuffers;
 use super::refine::{self, RayList};
@@ -7,7 +7,8 @@ use crate::gpu::Recorder;
 use crate::params::Quality;
 use crate::uniforms::Dispatch;
 
-/// Marches a sheet: the pixels of a lattice, then those between rays that do not look alike, or all of them.
+/// Marches a strip. With adaptive sampling it marches the initial grid, then halves the spacing until every pixel is
+/// interpolated or marched. Otherwise it marches all samples.
 pub(crate) fn record(rec: &mut Recorder<'_>, frame: &Frame, quality: &Quality, ray_list: &RayList, out: &CloudBuffers) {
     let gpu = rec.gpu;
     if !refine::is_needed(frame, quality) {
@@ -18,25 +19,25 @@ pub(crate) fn record(rec: &mut Recorder<'_>, frame: &Frame, quality: &Quality, r
         });
     }
     let mut frame = frame.clone();
-    frame.dispatch.lattice = refine::coarsest(&frame, quality);
-    refine::begin(rec, &frame, ray_list);
+    frame.dispatch.grid_spacing = refine::coarsest(&frame, quality);
+    refine::list_grid(rec, &frame, ray_list);
     let mut likely = 1.0;
     loop {
-        list(rec, &frame, refine::pixels(&frame), likely, ray_list, out);
-        if frame.dispatch.lattice == 1 {
+        list(rec, &frame, refine::grid_samples(&frame), likely, ray_list, out);
+        if frame.dispatch.grid_spacing == 1 {
             return;
         }
         refine::record(rec, &frame, ray_list, out);
-        frame.dispatch.lattice /= 2;
+        frame.dispatch.grid_spacing /= 2;
         frame.dispatch.spans = 1;
-        likely = REFINED;
+        likely = TYPICAL_LISTED;
     }
 }
 
-/// Share of the pixels of a finer lattice that are listed as a rule: in stills of eleven scenes an eighth to a fifth.
-const REFINED: f64 = 0.2;
+/// Typical fraction of the samples of a refined grid that are listed: an eighth to a fifth in stills of eleven scenes.
+const TYPICAL_LISTED: f64 = 0.2;
 
-/// Marches the listed pixels, of which there are `most` at most, and as a rule a share of them.
+/// Marches a ray list of at most `most` entries. `likely` is their typical number as a fraction of `most`.
 pub(crate) fn list(
     rec: &mut Recorder<'_>,
     frame: &Frame,

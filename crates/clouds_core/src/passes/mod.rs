@@ -1,4 +1,5 @@
-//! What makes a picture, one module for each pass with the WGSL file of the same name. Each records itself.
+//! Passes of a picture. Each has a module here, which records its dispatches, and a WGSL file of the same name under
+//! `passes/`.
 
 pub mod clouds;
 pub mod composite;

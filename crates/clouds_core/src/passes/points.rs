@@ -1,14 +1,16 @@
-//! Answers at points, and probes of single shader functions.
+//! Queries at points, and probes of single shader functions.
 
 use crate::error::Result;
 use crate::frame::Frame;
 use crate::gpu::{Recorder, Which};
 use crate::uniforms::Dispatch;
 
-/// Points in one dispatch: few enough that a march of each toward the sun stays far under a watchdog's second.
+/// Number of points per dispatch. A march of each toward the sun takes far less than a second, the time after which a
+/// watchdog may reset the device.
 pub(crate) const CHUNK: usize = 1 << 14;
 
-/// Runs a kernel over points (four numbers each), whatever it makes of them, `most` of them in a submission.
+/// Runs a kernel over points, at most `most` per submission. Points and results have four numbers each, whose meaning
+/// depends on the kernel.
 pub(crate) fn run(
     rec: &mut Recorder<'_>,
     frame: &Frame,

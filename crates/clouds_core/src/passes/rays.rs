@@ -1,4 +1,4 @@
-//! Rays that take more steps than one dispatch may: those that are not done go on in the next one.
+//! Rays that take more steps than a dispatch allows: unfinished rays continue in the next dispatch.
 
 use std::time::Instant;
 
@@ -9,12 +9,13 @@ use crate::gpu::Recorder;
 use crate::gpu::{Bindings, Name};
 use crate::uniforms::Dispatch;
 
-/// Most turns of a dispatch: with the loops inside one, lavapipe's limit of 65,535 over a shader is far (docs/numerics.md).
-const MOST_TURNS: u32 = 2048;
-/// What a dispatch should take, in seconds.
+/// Maximum number of loop iterations of a ray in a dispatch. With the inner loops they stay far below lavapipe's limit
+/// of 65,535 per shader (docs/numerics.md).
+const MAX_ITERATIONS: u32 = 2048;
+/// Target time of a dispatch in s.
 const SECONDS: f64 = 0.1;
 
-/// The buffers of a band of rays.
+/// Buffers of the rays of a strip.
 pub(crate) struct Rays {
     pub state: wgpu::Buffer,
     active: wgpu::Buffer,
@@ -23,6 +24,7 @@ pub(crate) struct Rays {
 }
 
 impl Rays {
+    /// Buffers for `rays` rays with states of `state_bytes` bytes each.
     pub fn new(gpu: &Gpu, rays: u64, state_bytes: u64) -> Self {
         Self {
             state: gpu.buffer("rays", state_bytes * rays),
@@ -32,7 +34,7 @@ impl Rays {
         }
     }
 
-    /// `state` is the variable that the rays are kept in.
+    /// Bindings by name. `state` is the shader variable of the ray states.
     pub fn bindings(&self, state: &'static str) -> Bindings {
         vec![
             (state, (&self.state).into()),
@@ -42,7 +44,10 @@ impl Rays {
         ]
     }
 
-    /// Runs a kernel until the ray of each pixel of the sheet is done. `state` is the variable that they are kept in.
+    /// Runs a kernel until the rays of all pixels of the strip are finished. `state` is the shader variable of the ray
+    /// states.
+    ///
+    /// Returns [`Error::Device`] if the driver ends a loop early.
     pub fn run(
         &self,
         rec: &mut Recorder<'_>,
@@ -64,14 +69,15 @@ impl Rays {
             let started = Instant::now();
             let downloads = rec.flush()?;
             let progress: &[[u32; 2]] = downloads[0].numbers();
-            // A driver that ends loops by itself must not pass for convergence.
-            if let Some([turns, _]) = progress.iter().find(|[turns, done]| *done == 0 && *turns != budget) {
-                let what = format!("{} ended a loop after {turns} of {budget} turns", rec.gpu.info.name);
+            // A loop that the driver ends early must not count as convergence.
+            let ended_early = |[iterations, done]: &&[u32; 2]| *done == 0 && *iterations != budget;
+            if let Some([iterations, _]) = progress.iter().find(ended_early) {
+                let what = format!("{} ended a loop after {iterations} of {budget} turns", rec.gpu.info.name);
                 return Err(Error::Device(format!("{what}: its results cannot be trusted")));
             }
             active = active.iter().zip(progress).filter(|(_, [_, done])| *done == 0).map(|(ray, _)| *ray).collect();
-            let pace = SECONDS / started.elapsed().as_secs_f64().max(1e-6);
-            budget = ((f64::from(budget) * pace.clamp(0.25, 4.0)) as u32).clamp(16, MOST_TURNS);
+            let ratio = SECONDS / started.elapsed().as_secs_f64().max(1e-6);
+            budget = ((f64::from(budget) * ratio.clamp(0.25, 4.0)) as u32).clamp(16, MAX_ITERATIONS);
         }
         Ok(())
     }

@@ -1,4 +1,4 @@
-//! The march with panels halved until nothing changes.
+//! Reference integrator: panels are halved until the result has converged.
 
 use super::clouds::CloudBuffers;
 use super::rays::Rays;
@@ -6,10 +6,10 @@ use crate::error::Result;
 use crate::frame::Frame;
 use crate::gpu::Recorder;
 
-/// Bytes of a `ReferenceRay` of bindings.wgsl.
+/// Size of `ReferenceRay` of bindings.wgsl in bytes.
 pub const RAY_BYTES: u64 = 192;
 
-/// Integrates the sheet of `frame`.
+/// Integrates the strip of `frame`.
 pub(crate) fn run(rec: &mut Recorder<'_>, frame: &Frame, rays: &Rays, out: &CloudBuffers) -> Result<()> {
     rays.run(rec, frame, ("reference", "reference"), "reference_rays", &out.bindings())
 }

@@ -1,5 +1,5 @@
-//! Temporal reprojection: one pixel in sixteen is marched, the others come from the frame before. Of a sparse picture, whose
-//! clouds are known at one pixel in sixteen, one in four of those is.
+//! Temporal reprojection: one pixel in sixteen is marched, the others come from the history. At low resolution, where
+//! one pixel in sixteen holds a sample, one sample in four is marched.
 
 use super::clouds::CloudBuffers;
 use super::march;
@@ -12,19 +12,19 @@ use crate::params::Quality;
 use crate::scene_depth::SceneTextures;
 use crate::uniforms::Dispatch;
 
-/// Largest share of the pixels of a frame that are marched one by one: a still, which marches an eighth to a fifth of them, is
-/// nearer to the truth then and takes no longer.
-const MOST_LISTED: f32 = 1.0 / 12.0;
+/// Maximum fraction of the samples of a frame in the ray list. Beyond it a still, which lists an eighth to a fifth of
+/// them, is more accurate and takes no longer.
+const MAX_LISTED: f32 = 1.0 / 12.0;
 
-/// A frame, and what it rests on.
+/// Clouds of a frame and their history lengths.
 pub(crate) struct HistoryBuffers {
     pub cloud_buffers: CloudBuffers,
-    /// Frames that each pixel has been followed since it was interpolated, or all of a round once it has had a ray of its own.
+    /// History length by sample: number of frames since it was interpolated, or a whole cycle once it has been marched.
     pub length: wgpu::Buffer,
 }
 
 impl HistoryBuffers {
-    /// Buffers of so many samples, and of so many history lengths: a still has none.
+    /// Buffers of `samples` samples and `lengths` history lengths. A still has no history lengths.
     pub fn new(gpu: &Gpu, samples: u64, lengths: u64) -> Self {
         Self { cloud_buffers: CloudBuffers::new(gpu, samples), length: gpu.buffer("followed", 4 * lengths) }
     }
@@ -33,7 +33,7 @@ impl HistoryBuffers {
         [self.cloud_buffers.bindings(), vec![("followed", (&self.length).into())]].concat()
     }
 
-    /// As the frame before.
+    /// Bindings as the history of the next frame.
     fn past(&self) -> Bindings {
         vec![
             ("history", (&self.cloud_buffers.clouds).into()),
@@ -43,17 +43,17 @@ impl HistoryBuffers {
     }
 }
 
-/// The rays of a frame, one in each cell, and what the frame before says of them.
+/// Current rays, one per cell, and their predictions from the history.
 pub(crate) struct Current {
     cloud_buffers: CloudBuffers,
     cells: wgpu::Buffer,
-    /// Votes for a still less those for going on.
+    /// Votes for a still minus votes against it.
     votes: wgpu::Buffer,
-    /// Not 0 where the frame is a still.
+    /// Other than 0 if the frame is a still.
     still: wgpu::Buffer,
 }
 
-/// Bytes of `CellPast` (bindings.wgsl).
+/// Size of `CellPast` of bindings.wgsl in bytes.
 const CELL_BYTES: u64 = 64;
 
 impl Current {
@@ -66,15 +66,17 @@ impl Current {
         }
     }
 
-    /// What is kept of them on the device.
+    /// Bindings as targets of the march, and of the predictions.
     pub fn bindings(&self) -> Bindings {
         [self.cloud_buffers.bindings(), self.own()].concat()
     }
 
+    /// Bindings of predictions and votes.
     fn own(&self) -> Bindings {
         vec![("cells", (&self.cells).into()), ("votes", (&self.votes).into()), ("is_still", (&self.still).into())]
     }
 
+    /// Bindings as inputs of reprojection.
     fn read(&self) -> Bindings {
         let rays = vec![
             ("current", (&self.cloud_buffers.clouds).into()),
@@ -84,21 +86,22 @@ impl Current {
     }
 }
 
-/// What a frame is made in, and from.
+/// Buffers of a frame of an animation.
 pub(crate) struct Buffers<'a> {
     pub ray_list: &'a RayList,
     pub current: &'a Current,
-    /// The clouds of the frame before.
+    /// Clouds of the previous frame.
     pub before: &'a HistoryBuffers,
-    /// Clouds of the frame before where its sample grid was another.
+    /// Clouds of the previous frame on another sample grid, if it has changed.
     pub resized: Option<&'a HistoryBuffers>,
-    /// The user's scene in the frame before.
+    /// User's scene in the previous frame.
     pub scene_before: &'a SceneTextures,
+    /// Clouds of this frame.
     pub now: &'a HistoryBuffers,
 }
 
-/// Records a frame: the first one, a still that is the history of those after it, or the one after a frame `previous`, by
-/// its number since the last cut.
+/// Records a frame of an animation. `previous` is the index of the previous frame since the last cut. Without one the
+/// frame is a still, the history of the frames after it.
 pub(crate) fn record(
     rec: &mut Recorder<'_>,
     frame: &Frame,
@@ -110,15 +113,15 @@ pub(crate) fn record(
         rescale(rec, frame, old, buffers.before);
     }
     let Some(previous) = previous else {
-        rec.compile_ahead(|rec| follow(rec, frame, quality, 0, buffers));
-        return begin(rec, frame, quality, buffers.ray_list, buffers.now);
+        rec.compile_ahead(|rec| reproject(rec, frame, quality, 0, buffers));
+        return still(rec, frame, quality, buffers.ray_list, buffers.now);
     };
-    follow(rec, frame, quality, previous + 1, buffers);
+    reproject(rec, frame, quality, previous + 1, buffers);
 }
 
-/// Records a frame of one ray in each cell and of the history; or a still, where the history is invalid in too many pixels.
+/// Records a frame from one ray per cell and the history, or a still if the history is invalid in too many samples.
 /// `index` counts frames since the last cut.
-fn follow(rec: &mut Recorder<'_>, frame: &Frame, quality: &Quality, index: u32, buffers: &Buffers<'_>) {
+fn reproject(rec: &mut Recorder<'_>, frame: &Frame, quality: &Quality, index: u32, buffers: &Buffers<'_>) {
     let gpu = rec.gpu;
     let Buffers { ray_list, current, before, now, .. } = *buffers;
     let stride = frame.grid.stride();
@@ -126,7 +129,7 @@ fn follow(rec: &mut Recorder<'_>, frame: &Frame, quality: &Quality, index: u32, 
     let rays = frame.at_rays(index);
     march::record(rec, &rays, quality, ray_list, &current.cloud_buffers);
 
-    // Asks the frame before for these rays, and compares.
+    // Predictions of these rays from the history, and their validation.
     let block = rays.dispatch.binding(gpu);
     let grid = [rays.dispatch.march_width, rays.dispatch.strip_rows, 1];
     let read = [before.past(), current.read(), vec![block.clone()]].concat();
@@ -134,7 +137,7 @@ fn follow(rec: &mut Recorder<'_>, frame: &Frame, quality: &Quality, index: u32, 
     rec.dispatch(("reproject", "predict"), read.clone(), grid);
     rec.dispatch(("reproject", "validate"), read.clone(), grid);
 
-    // Follows, interpolates, or lists pixels that are to be marched, as neither rays nor past say anything about them.
+    // Samples are reprojected or interpolated. Those without valid history between rays of high contrast are listed.
     let scene_before = vec![("scene_before", buffers.scene_before.depth())];
     let read = [before.past(), current.read(), scene_before, now.bindings(), ray_list.bindings()].concat();
     let [columns, rows] = [rays.dispatch.march_width, height.div_ceil(stride)];
@@ -145,27 +148,28 @@ fn follow(rec: &mut Recorder<'_>, frame: &Frame, quality: &Quality, index: u32, 
         Dispatch { first_row, rows, ..rays.dispatch.clone() }.binding(gpu)
     });
 
-    // A still, where most rays are not what the past says, or more pixels are listed than one marches.
+    // The frame is a still if more than a fourth of the predictions fail, or if more samples are listed than a still
+    // marches.
     let listed = frame.at_samples();
     let pixels = width * height;
-    let most = if refine::is_needed(&listed, quality) { MOST_LISTED * pixels as f32 } else { f32::MAX };
+    let most = if refine::is_needed(&listed, quality) { MAX_LISTED * pixels as f32 } else { f32::MAX };
     let ours = [current.own(), ray_list.bindings(), vec![("most_listed", Binding::block(&[most.to_bits(), 0, 0, 0]))]];
     rec.dispatch(("reproject", "choose"), ours.concat(), [1; 3]);
-    march::list(rec, &listed, pixels, MOST_LISTED.into(), ray_list, &now.cloud_buffers);
-    rec.when(&current.still, |rec| begin(rec, frame, quality, ray_list, now));
+    march::list(rec, &listed, pixels, MAX_LISTED.into(), ray_list, &now.cloud_buffers);
+    rec.when(&current.still, |rec| still(rec, frame, quality, ray_list, now));
 }
 
 /// Records a still that is the history of the frames after it.
-fn begin(rec: &mut Recorder<'_>, frame: &Frame, quality: &Quality, ray_list: &RayList, out: &HistoryBuffers) {
-    let mut still = frame.at_samples();
-    march::record(rec, &still, quality, ray_list, &out.cloud_buffers);
-    still.dispatch.lattice = refine::coarsest(&still, quality);
-    let bindings = [vec![still.dispatch.binding(rec.gpu)], out.bindings()].concat();
+fn still(rec: &mut Recorder<'_>, frame: &Frame, quality: &Quality, ray_list: &RayList, out: &HistoryBuffers) {
+    let mut frame = frame.at_samples();
+    march::record(rec, &frame, quality, ray_list, &out.cloud_buffers);
+    frame.dispatch.grid_spacing = refine::coarsest(&frame, quality);
+    let bindings = [vec![frame.dispatch.binding(rec.gpu)], out.bindings()].concat();
     let [width, height] = frame.grid.samples();
     rec.dispatch(("reproject", "begin"), bindings, [width, height, 1]);
 }
 
-/// Makes of the frame `before`, which had another size or was known at other pixels, one like `frame`.
+/// Resamples the history `before` of another size or sample spacing to the sample grid of `frame`.
 fn rescale(rec: &mut Recorder<'_>, frame: &Frame, before: &HistoryBuffers, out: &HistoryBuffers) {
     let bindings = [vec![frame.dispatch.binding(rec.gpu)], out.bindings(), before.past()].concat();
     let [width, height] = frame.grid.samples();

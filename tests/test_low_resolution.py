@@ -49,7 +49,7 @@ def wider(camera, size, rim):
 @pytest.mark.slow_after(1)
 @pytest.mark.parametrize("size", [(240, 136), (241, 135), (163, 110), (242, 139), (1024, 1100)])
 def test_a_still_lies_between_its_rays(size):
-    """Up to those beyond its edges, and across the sheets that a large one is made in."""
+    """Up to those beyond its edges, and across the strips that a large one is made in."""
     camera, params = next(shots(1))[0], SKY.with_(**BARE)
     preview, every = (quality.replace(jitter=False) for quality in (PREVIEW, EVERY))
     got = nubis.Renderer(*size, quality=preview).render(camera, params, background=None)

@@ -21,7 +21,6 @@ override LIGHT_SHAFTS: bool = false; // cloud shadows on the air
 override SCENE: bool = false; // a user's scene among the clouds
 override SUBRAYS: bool = false; // pixels may be wider than clouds (subrays.wgsl)
 override LOW_RESOLUTION: bool = false; // samples of the clouds only at corners of cells of pixels (sample_grid.wgsl)
-override WIDE_PHASE: bool = false; // phase function averaged over a pixel
 override LIGHT_DETAIL: bool = true; // light samples with detail noise
 override LIGHT_CHEAP: bool = true; // light samples without detail noise
 

@@ -1,5 +1,5 @@
-// Radiance that clouds scatter toward the eye from sunlight and skylight. `light_model` stands for the file of the light
-// model in light_models/: `lobe_phase`, `seen_scattering`, `slowest_extinction` and `AMBIENT` are the model's.
+// Radiance that clouds scatter toward the eye from sunlight and skylight. `light_model` stands for the file of the
+// light model in light_models/, which has `lobe_phase`, `seen_scattering`, `slowest_extinction` and `AMBIENT`.
 #import math
 #import phase
 #import droplets
@@ -147,7 +147,7 @@ fn model_phase(one_minus_mu: f32) -> f32 {
 // Scattering angle at a pixel, given by its corner.
 fn seen_turn(direction: vec3f, corner: vec2f) -> Turn {
     let one_minus_mu = one_minus_cos(direction, frame.sky.sun_direction);
-    if !WIDE_PHASE {
+    if frame.view.phase_samples <= 1u {
         return Turn(one_minus_mu, model_phase(one_minus_mu));
     }
     let n = frame.view.phase_samples;

@@ -19,7 +19,6 @@ pub(crate) fn of_picture(params: &Params, quality: &Quality, frame: &Frame, laye
         ("SUBRAYS", on(params.volume.is_none() && frame.has_subrays())),
         ("LOW_RESOLUTION", on(frame.grid.low_resolution)),
         ("STRIDE", f64::from(frame.grid.stride())),
-        ("WIDE_PHASE", on(frame.view.phase_samples > 1)),
         ("HIGH", on(high)),
         ("HIGH_EMBOSS", on(high && frame.high_emboss)),
         ("HIGH_LOW_SUN", on(high && frame.high_low_sun)),

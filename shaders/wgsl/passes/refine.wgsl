@@ -1,8 +1,8 @@
 // Adaptive sampling: pixels between samples of low contrast are interpolated, the others get a ray.
 //
-// Samples lie on a grid of spacing `dispatch.grid_spacing`, to which the last column and row belong. `refine` halves the
-// spacing: each new pixel of the grid is interpolated here or added to the ray list. An invocation has a square of the
-// grid and resolves its middle and the middles of its upper and left edges; neighbouring squares share edges.
+// Samples lie on a grid of spacing `dispatch.grid_spacing`, to which the last column and row belong. `refine` halves
+// the spacing: each new pixel of the grid is interpolated here or added to the ray list. An invocation has a square of
+// the grid and resolves its middle and the middles of its upper and left edges; neighbouring squares share edges.
 #import bindings
 #import camera
 #import contrast

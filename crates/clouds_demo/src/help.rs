@@ -40,7 +40,7 @@ pub fn key_window(context: &egui::Context, open: &mut bool) {
     });
 }
 
-/// Hint how to bring the panels back, for [`HINT_DURATION`] after they were hidden.
+/// Hint how to bring the panels back, for `HINT_DURATION` after they were hidden.
 pub fn panel_hint(ui: &Ui, view: egui::Rect, hidden_since: Instant) {
     let remaining = HINT_DURATION.saturating_sub(hidden_since.elapsed());
     if remaining.is_zero() {

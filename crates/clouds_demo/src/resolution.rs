@@ -52,7 +52,7 @@ impl DynamicResolution {
         }
     }
 
-    /// Records a frame's time; every [`FRAMES_PER_DECISION`] frames, chooses the step for a target frame time.
+    /// Records a frame's time; every `FRAMES_PER_DECISION` frames, chooses the step for a target frame time.
     ///
     /// The model takes frame time as proportional to pixel count. Part of the time is constant, so the model
     /// overestimates the effect of a step. Steps toward more pixels therefore never miss the target, and steps toward

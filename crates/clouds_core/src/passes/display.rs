@@ -20,7 +20,7 @@ pub struct Screen {
 
 impl Screen {
     /// Black screen of `width` x `height` pixels. `exposure` is in stops, `tone_map` one of
-    /// [`TONE_MAPS`](crate::color::TONE_MAPS).
+    /// [`TONE_MAPS`].
     ///
     /// Returns [`Error::Parameter`] for an invalid exposure or tone map.
     pub fn new(gpu: &Gpu, [width, height]: [u32; 2], exposure: f32, tone_map: &str) -> Result<Self> {

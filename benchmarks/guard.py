@@ -120,7 +120,7 @@ def others() -> Iterator[Case]:
         "no high clouds": {"high_clouds.coverage": 0.0},
         "no clouds": {"clouds.coverage": 0.0},
         "clear spot": {"weather.clear_at": (0.0, 3000.0), "weather.clear_radius": 2000.0},
-        "no shadows": {"atmosphere.ground_shadows": False, "atmosphere.beams": False},
+        "no shadows": {"atmosphere.ground_shadows": False, "atmosphere.light_shafts": False},
         "low sun": {"sun.elevation": 2.0},
     }
     for name, changes in switches.items():

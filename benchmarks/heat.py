@@ -53,8 +53,8 @@ def stages() -> dict[str, nubis.Quality]:
     """Qualities of the optimisation stages of the thesis that this march can switch off."""
     whole = nubis.quality("thesis2018")
     return {
-        "off": whole.replace(min_transmittance=0.0, big_step=1),
-        "B": whole.replace(big_step=1),
+        "off": whole.replace(min_transmittance=0.0, coarse_step=1),
+        "B": whole.replace(coarse_step=1),
         "D": whole,
     }
 
@@ -65,7 +65,7 @@ def ours() -> dict[str, nubis.Quality]:
     for name in "draft", "balanced":
         quality = nubis.quality(name)
         found |= {
-            f"{name}, a ray for each pixel": quality.replace(contrast=0.0),
+            f"{name}, a ray for each pixel": quality.replace(adaptive_threshold=0.0),
             f"{name}": quality,
         }
     return found

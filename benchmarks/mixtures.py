@@ -44,7 +44,7 @@ def sky(rng: np.random.Generator) -> tuple[nubis.Camera, nubis.Params]:
             "clouds.precipitation": 0.5 * rain,
             "high_clouds.coverage": 0.5 * high,
             "atmosphere.enabled": air,
-            "atmosphere.beams": beams,
+            "atmosphere.light_shafts": beams,
             "atmosphere.ground_shadows": shadows,
             "clouds.coverage": float(rng.uniform(0.2, 0.8)),
         }

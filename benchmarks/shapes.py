@@ -212,7 +212,7 @@ def _bakes(repeats: int) -> Row:
 
 def _switches(size: Size, repeats: int) -> list[Row]:
     """thesis2018, figure 39: savings by optimisations. A and C cannot be switched off."""
-    off = {"min_transmittance": 0.0, "big_step": 1}
+    off = {"min_transmittance": 0.0, "coarse_step": 1}
     steps = {
         "A, C: light and detail only in cloud": off,
         "B: and early exit": off | {"min_transmittance": 0.01},

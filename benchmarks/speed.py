@@ -30,26 +30,30 @@ RESULTS = Path(__file__).parent / "results"
 PUBLISHED = "nubis2015", "thesis2018", "vsu2022"
 #: Own qualities: the fastest of at most the same error is compared with a published one.
 OURS = {
-    "preview, coarser": nubis.quality("preview").replace(light_steps=6, light_share=0.3),
+    "preview, coarser": nubis.quality("preview").replace(light_steps=6, light_group_weight=0.3),
     "preview": nubis.quality("preview"),
     "preview, finer": nubis.quality("preview").replace(
-        steps_zenith=161, steps_horizon=384, big_step=6, light_steps=16, light_share=0.1
+        steps_zenith=161, steps_horizon=384, coarse_step=6, light_steps=16, light_group_weight=0.1
     ),
     "draft": nubis.quality("draft"),
     "balanced": nubis.quality("balanced"),
     "balanced, finer": nubis.quality("balanced").replace(
-        steps_zenith=161, steps_horizon=384, big_step=6, light_share=0.1, contrast=0.2
+        steps_zenith=161,
+        steps_horizon=384,
+        coarse_step=6,
+        light_group_weight=0.1,
+        adaptive_threshold=0.2,
     ),
     "balanced, finest": nubis.quality("balanced").replace(
         steps_zenith=215,
         steps_horizon=512,
-        big_step=6,
+        coarse_step=6,
         light_steps=24,
-        light_share=0.1,
-        contrast=0.1,
+        light_group_weight=0.1,
+        adaptive_threshold=0.1,
     ),
     "balanced, every ray": nubis.quality("balanced").replace(
-        steps_zenith=168, steps_horizon=400, big_step=4, contrast=0.0
+        steps_zenith=168, steps_horizon=400, coarse_step=4, adaptive_threshold=0.0
     ),
 }
 #: Own qualities with a public name.
@@ -180,7 +184,7 @@ def _pairs() -> Iterator[tuple[str, str, Row, Row]]:
     # Features that are switched off one at a time.
     yield "without air", "fair_weather", {"atmosphere.enabled": False}, {}
     yield "without shadows on the ground", "fair_weather", {"atmosphere.ground_shadows": False}, {}
-    yield "without beams", "fair_weather", {"atmosphere.beams": False}, {}
+    yield "without beams", "fair_weather", {"atmosphere.light_shafts": False}, {}
     yield "without high clouds", "fair_weather", bare, {}
     yield "without the larger weather map", "fair_weather", {"weather.broad_variety": 0.0}, {}
     yield "without the second deck", "two_decks", {"upper_clouds.coverage": 0.0}, {}

@@ -45,7 +45,7 @@ PLAIN = {
     "clouds.precipitation": 0.0,
     "weather.broad_variety": 0.0,
     "high_clouds.coverage": 0.0,
-    "atmosphere.beams": False,
+    "atmosphere.light_shafts": False,
     "atmosphere.ground_shadows": False,
     "sun.visible": False,
 }

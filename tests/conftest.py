@@ -39,7 +39,7 @@ def renderer():
     def make(width=64, height=36, quality="draft"):
         if isinstance(quality, str):
             # Every pixel is marched; which need not be is tested in test_refine.py.
-            quality = nubis.quality(quality).replace(contrast=0.0)
+            quality = nubis.quality(quality).replace(adaptive_threshold=0.0)
         return nubis.Renderer(width, height, quality=quality)
 
     return make

@@ -475,14 +475,14 @@ def blown(params, degrees, speed, time):
     The velocity is the mean one, stretched and turned by 1 + share * (mean of four unit vectors
     that turn), in complex numbers.
     """
-    rate, phase = turns(params.wander, 0)
+    rate, phase = turns(params.wind_variation, 0)
     pieces = int(np.ceil(abs(time) * np.abs(rate).max() / 2 / np.pi * 8)) + 1
     ends = np.linspace(0, time, pieces + 1)
     nodes, weights = np.polynomial.legendre.leggauss(12)
     half = 0.5 * np.diff(ends)[:, None]
     at = 0.5 * (ends[:-1, None] + ends[1:, None]) + half * nodes
     gust = np.exp(1j * (rate * at[..., None] + phase)).mean(axis=-1)
-    seconds = time + f32(params.wander.wind) * (half * weights * gust).sum()
+    seconds = time + f32(params.wind_variation.wind) * (half * weights * gust).sum()
     east, north, _ = ref64.compass(float(f32(degrees))) * f32(speed)
     way = (east + 1j * north) * seconds
     return np.array([way.real, way.imag])
@@ -490,9 +490,11 @@ def blown(params, degrees, speed, time):
 
 def cover(params, time):
     """The mean cover, and what wanders, in steps of a 1024th."""
-    rate, phase = turns(params.wander, 1)
+    rate, phase = turns(params.wind_variation, 1)
     swing = np.round(np.sin(rate * time + phase).mean() * 1024) / 1024
-    return float(np.clip(f32(params.clouds.coverage) + f32(params.wander.coverage) * swing, 0, 1))
+    return float(
+        np.clip(f32(params.clouds.coverage) + f32(params.wind_variation.coverage) * swing, 0, 1)
+    )
 
 
 def kept_clear(points, weather):

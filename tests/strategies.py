@@ -258,7 +258,7 @@ FEW = {"steps_zenith": 32, "steps_horizon": 64, "light_steps": 6}
 
 # Paths are dear: two, and not for long.
 #: Every pixel is marched: a static shot becomes the still.
-DRAFT = nubis.quality("draft").replace(contrast=0.0, path_samples=2, path_scatterings=64)
+DRAFT = nubis.quality("draft").replace(adaptive_threshold=0.0, path_samples=2, path_scatterings=64)
 
 
 @st.composite
@@ -270,7 +270,10 @@ def qualities(draw):
     else:
         values = {}
         for f in dataclasses.fields(Quality):
-            if kind("quality", f.name) is int and f.name not in ("big_step", "empty_samples"):
+            if kind("quality", f.name) is int and f.name not in (
+                "coarse_step",
+                "empty_before_coarse",
+            ):
                 low = int(allowed("quality", f.name)[1][0])
                 values[f.name] = draw(st.integers(low, FEW.get(f.name, low + 1)))
             else:

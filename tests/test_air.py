@@ -184,11 +184,11 @@ def dusk(make, step):
 
 
 DUSK = {
-    "contrast": 0.0,
+    "adaptive_threshold": 0.0,
     "steps_zenith": 80,
     "steps_horizon": 148,
     "light_steps": 96,
-    "light_share": 0.0,
+    "light_group_weight": 0.0,
 }
 
 
@@ -254,7 +254,7 @@ def among_slabs(grid, **changes):
         "sun.azimuth": 180.0,
         "sun.visible": False,
         "high_clouds.coverage": 0.0,
-        "atmosphere.beams": False,  # test_light_shafts.py
+        "atmosphere.light_shafts": False,  # test_light_shafts.py
         **UNIT,
     }
     return nubis.Params(volume=grid).with_(**{**base, **changes})
@@ -446,7 +446,7 @@ def test_ground_without_air_lights_clouds(renderer, model):
     )
     params = params.replace(volume=grid)
     camera = looking((0.0, 0.0, 1.0), 10.0, 20.0)
-    method = nubis.quality("draft").replace(contrast=0.0, path_samples=512)
+    method = nubis.quality("draft").replace(adaptive_threshold=0.0, path_samples=512)
     dark, bright = (
         renderer(4, 3, method)
         .render(

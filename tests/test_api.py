@@ -125,7 +125,7 @@ def test_published_steps():
         method = nubis.quality(name)
         assert (method.steps_zenith, method.steps_horizon) == (64, 128)
         assert method.light_steps + method.far_sample == 6
-    assert nubis.quality("thesis2018").big_step == 3
+    assert nubis.quality("thesis2018").coarse_step == 3
     vsu = nubis.quality("vsu2022")
     assert (vsu.steps_zenith, vsu.steps_horizon, vsu.light_steps) == (250, 250, 64)
 

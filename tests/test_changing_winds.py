@@ -36,8 +36,8 @@ MEMBERS = {
     "high_clouds.speed": (25.0, 25.5),
     "high_clouds.direction": (75.0, 75.3),
     "high_clouds.evolution": (0.001, 0.0011),
-    "wander.wind": (0.3, 0.5),
-    "wander.period": (7200.0, 5000.0),
+    "wind_variation.wind": (0.3, 0.5),
+    "wind_variation.period": (7200.0, 5000.0),
 }
 DECK = {"upper_clouds.coverage": 0.5, "upper_clouds.base": 5000.0, "upper_clouds.top": 6500.0}
 HOUR = 3600.0
@@ -50,7 +50,8 @@ def value(params, path):
 
 
 def wander(params):
-    return {"wander.wind": 0.4, "wander.coverage": 0.2} if params.startswith("wander") else {}
+    wanders = {"wind_variation.wind": 0.4, "wind_variation.coverage": 0.2}
+    return wanders if params.startswith("wind_variation") else {}
 
 
 def place(params, time):
@@ -76,7 +77,7 @@ def rates(params):
     each.append(value(params, "high_clouds.speed"))
     pairs = [part for wind in each for part in (np.real(wind), np.imag(wind))]
     updraft, evolution = value(params, "wind.updraft"), value(params, "high_clouds.evolution")
-    return np.array([*pairs, updraft, evolution, 1 / value(params, "wander.period")])
+    return np.array([*pairs, updraft, evolution, 1 / value(params, "wind_variation.period")])
 
 
 def numerical(keys, start, end, pieces=8):
@@ -105,7 +106,8 @@ def test_the_way_between_keys_is_the_integral_of_the_winds(rng, easing):
     rounds no wind, and the sky that it returns has f32, 6e-8 of 30 m/s times a day, 0.15 m in 1300
     km, which its drift makes good at its own time.
     """
-    skies = [other_winds(rng, **{"wander.period": period}) for period in (3000.0, 9000.0, 60.0)]
+    periods = 3000.0, 9000.0, 60.0
+    skies = [other_winds(rng, **{"wind_variation.period": period}) for period in periods]
     keys = Keyframes(zip((2.0, 8.0, 26.0), skies, strict=True), easing, seconds=HOUR)
     first = place(keys.at(2.0), 2 * HOUR)
     np.testing.assert_allclose(first, place(skies[0], 2 * HOUR), rtol=1e-12)
@@ -139,18 +141,18 @@ def test_gusts_are_carried_on_by_the_period_of_each_moment(easing):
     """The velocity, by central differences of the way, is the wind of the moment in gusts of the
     phase that the wander has come to, which goes by the period of each moment.
     """
-    gusty = {"wander.seed": 5, "wind.direction": 90.0}
-    a = Params().with_(**gusty, **{"wander.wind": 0.8, "wander.period": 900.0, "wind.speed": 10.0})
-    b = a.with_(**{"wander.wind": 0.2, "wander.period": 3000.0, "wind.speed": 30.0})
+    gusty = {"wind_variation.seed": 5, "wind.direction": 90.0, "wind_variation.wind": 0.8}
+    a = Params().with_(**gusty, **{"wind_variation.period": 900.0, "wind.speed": 10.0})
+    b = a.with_(**{"wind_variation.wind": 0.2, "wind_variation.period": 3000.0, "wind.speed": 30.0})
     keys = Keyframes([(1000.0, a), (9000.0, b)], easing)
     k = np.arange(4)
-    _, phase = ref64_noise.turns(a.wander, 0)
+    _, phase = ref64_noise.turns(a.wind_variation, 0)
     turn = (-1.0) ** k * 2 * np.pi * 3 ** (-(k - 1.5) / 4)
     for time in (1200.0, 3000.0, 4999.0, 5001.0, 8700.0):
         sky = keys.at(time)
         before, now, after = (place(keys.at(t), t) for t in (time - 1, time, time + 1))
         gust = np.exp(1j * (turn * now[-1] + phase)).mean()
-        expected = value(sky, "wind.speed") * (1 + value(sky, "wander.wind") * gust)
+        expected = value(sky, "wind.speed") * (1 + value(sky, "wind_variation.wind") * gust)
         went = complex(*(after - before)[:2]) / 2
         assert abs(went - expected) < 1e-4, time
     # The phases of the cover are those of the same wander.
@@ -248,13 +250,13 @@ def test_frames_change_as_with_a_steady_wind(renderer, path):
 
 
 @pytest.mark.slow_after(1)
-@pytest.mark.parametrize("path", ["wind.speed", "high_clouds.speed", "wander.period"])
+@pytest.mark.parametrize("path", ["wind.speed", "high_clouds.speed", "wind_variation.period"])
 def test_an_animation_goes_on_where_winds_change(renderer, path):
     """Shots with another wind each, as from a slider, and nothing said of where the sky is: after
     an hour from one to the next the sky moves as with a steady wind.
     """
     old, new = MEMBERS[path]
-    winds = {"wander.wind": 0.4} if path.startswith("wander") else {}
+    winds = {"wind_variation.wind": 0.4} if path.startswith("wind_variation") else {}
     before = Params().with_(**winds, **{path: old})
     make = renderer(48, 27)
 
@@ -348,5 +350,5 @@ def test_what_is_no_change(make, words):
 
 
 def gusts_for_years():
-    a = Params().with_(**{"wander.wind": 0.5, "wander.period": 60.0})
+    a = Params().with_(**{"wind_variation.wind": 0.5, "wind_variation.period": 60.0})
     Keyframes([(0.0, a), (1e7, a.with_(**{"wind.speed": 9.0}))])

@@ -25,14 +25,14 @@ def looking(azimuth=0.0, pitch=0.0, fov_y=10.0, eye=EYE):
 
 
 def quality(contrast, name="draft"):
-    return nubis.quality(name).replace(contrast=contrast)
+    return nubis.quality(name).replace(adaptive_threshold=contrast)
 
 
-def both(camera, params, contrast=0.5, size=SIZE, **given):
+def both(camera, params, adaptive_threshold=0.5, size=SIZE, **given):
     """The layers of a picture where each pixel is worked out, and where cells are."""
     return (
         nubis.Renderer(*size, quality=quality(c)).render_layers(camera, params, **given)
-        for c in (0.0, contrast)
+        for c in (0.0, adaptive_threshold)
     )
 
 
@@ -250,4 +250,4 @@ def test_moving_frames_are_as_good():
 
 @pytest.mark.parametrize("name", ["high", "nubis2015", "thesis2018", "vsu2022"])
 def test_published_qualities_know_no_cells(name):
-    assert nubis.quality(name).contrast == 0
+    assert nubis.quality(name).adaptive_threshold == 0

@@ -115,7 +115,7 @@ def test_no_leap_where_something_begins(picture, view, name, value):
 @pytest.mark.slow
 def test_a_deck_begins_to_show_after_it_has_room(renderer):
     """The cover up to which the shell grows with a deck shows nothing of it at all."""
-    method = nubis.quality("high").replace(contrast=0.0)
+    method = nubis.quality("high").replace(adaptive_threshold=0.0)
     camera = nubis.Camera.look_at((0, 0, 60_000), (0, 1, 0), fov_y=30)
     wet = {"clouds.precipitation": 1.0, "clouds.coverage": 0.0099, "upper_clouds.coverage": 0.0099}
     layers = renderer(64, 64, method).render_layers(camera, Params().with_(**wet))

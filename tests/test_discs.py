@@ -241,7 +241,7 @@ def test_peaks_of_phase_functions_in_wide_pixels(renderer, peak, model):
     direction = side * toward(0.7, 41.3)
     camera = nubis.Camera.look_at(eye, np.add(eye, 1000 * direction), fov_y=30.0)
     size, n = (16, 12), 16
-    few = nubis.quality("draft").replace(contrast=0.0, steps_zenith=12, steps_horizon=12)
+    few = nubis.quality("draft").replace(adaptive_threshold=0.0, steps_zenith=12, steps_horizon=12)
     fine = renderer(size[0] * n, size[1] * n, few).render(camera, params, background=None)
     fine = fine[..., :3].astype(np.float64)
     weight = solid_angles(camera, size[0] * n, size[1] * n)[..., None]
@@ -259,7 +259,7 @@ def test_width_of_a_pixel_is_that_of_its_place(renderer):
     """
     params = nubis.Params().with_(**{"high_clouds.coverage": 0.0, "sun.visible": False})
     eye = (0.0, 0.0, 200.0)
-    quality = nubis.quality("draft").replace(contrast=0.0, jitter=False)
+    quality = nubis.quality("draft").replace(adaptive_threshold=0.0, jitter=False)
     off, fov = 50.0, 110.0
     wide = renderer(601, 41, quality)
     narrow = renderer(3, 3, quality)

@@ -216,7 +216,7 @@ def test_shadows_of_the_deck_above(renderer):
     all of them grew with their distance, a balanced picture was 15 % off, not 3.
     """
     scene = nubis.scenes["two_decks"]
-    method = nubis.quality("balanced").replace(contrast=0.0, light_share=0.01)
+    method = nubis.quality("balanced").replace(adaptive_threshold=0.0, light_group_weight=0.01)
     few, many = (
         renderer(96, 54, method.replace(light_steps=n)).render_layers(*scene)["radiance"]
         for n in (16, 128)

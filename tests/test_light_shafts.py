@@ -10,7 +10,7 @@ import ref64_air
 SIZE = 160, 90
 #: Pixels that are compared with the ref64.
 SOME = slice(4, None, 9), slice(4, None, 9)
-OFF = {"atmosphere.beams": False}
+OFF = {"atmosphere.light_shafts": False}
 CHEAP = nubis.quality("draft").replace(steps_zenith=8, steps_horizon=8, light_steps=1)
 #: As clouds pass it on (Haurwitz 1948, stratus).
 PASSED_ON = 0.25
@@ -270,7 +270,7 @@ def test_animated():
     params = smooth(**{"sun.elevation": 20.0, "sun.azimuth": 20.0, "wind.speed": 40.0})
     params = params.with_(**{"wind.weather_speed": 40.0})
     camera = looking(-12.0, eye=(0, 0, 900))  # ground and air, and hardly a cloud
-    quality = nubis.quality("draft").replace(contrast=0.0)
+    quality = nubis.quality("draft").replace(adaptive_threshold=0.0)
     times = [0.0, 40.0, 80.0]
     frames = nubis.Renderer(64, 36, quality=quality).animate(
         (camera, params, time) for time in times

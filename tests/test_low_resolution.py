@@ -12,7 +12,7 @@ from nubis import Camera
 SIZE = 240, 136
 PREVIEW = nubis.quality("preview")
 #: A ray for each pixel.
-EVERY = PREVIEW.replace(contrast=0.0)
+EVERY = PREVIEW.replace(adaptive_threshold=0.0)
 #: The clouds alone, as they are marched: no air before them, no high clouds.
 BARE = {"atmosphere.enabled": False, "high_clouds.coverage": 0.0}
 EYE, TARGET = (0, 0, 200), (300, 1000, 450)

@@ -111,10 +111,10 @@ SHARES = {"fair_weather": 0.03, "overcast": 0.023, "in_cloud": 0.03, "storm": 0.
 def test_light_for_a_share_is_that_of_each_sample(renderer, scene):
     """Fewer looks at the sun, and nearly the same picture; less share, less error."""
     camera, params = nubis.scenes[scene]
-    balanced = nubis.quality("balanced").replace(contrast=0.0)
+    balanced = nubis.quality("balanced").replace(adaptive_threshold=0.0)
     each, fine, coarse = (
-        renderer(96, 54, balanced.replace(light_share=share)).render_layers(camera, params)
-        for share in (0.0, 0.03, balanced.light_share)
+        renderer(96, 54, balanced.replace(light_group_weight=share)).render_layers(camera, params)
+        for share in (0.0, 0.03, balanced.light_group_weight)
     )
     cloud = each["transmittance"] < 0.999
     mean = each["radiance"][cloud].mean()
@@ -136,10 +136,10 @@ def test_rain_is_lit_in_small_shares(renderer):
     """
     camera, storm = nubis.scenes["storm"]
     params = storm.with_(**{"clouds.rain_extinction": 5e-4})
-    balanced = nubis.quality("balanced").replace(contrast=0.0)
+    balanced = nubis.quality("balanced").replace(adaptive_threshold=0.0)
     each, shared = (
-        renderer(96, 54, balanced.replace(light_share=share)).render_layers(camera, params)
-        for share in (0.0, balanced.light_share)
+        renderer(96, 54, balanced.replace(light_group_weight=share)).render_layers(camera, params)
+        for share in (0.0, balanced.light_group_weight)
     )
     cloud = each["transmittance"] < 0.999
     error = (shared["radiance"] - each["radiance"])[cloud]
@@ -169,7 +169,7 @@ def test_a_veil_does_not_move_the_light_of_the_cloud_behind(renderer):
     camera = nubis.Camera.look_at((-500, 0, 1000), (0, 0, 1000), fov_y=2)
     fine = ref64.fine(600, 32)
     each, together = (
-        renderer(8, 4, fine.replace(light_share=share)).render_layers(camera, params)
+        renderer(8, 4, fine.replace(light_group_weight=share)).render_layers(camera, params)
         for share in (0.0, 0.1)
     )
     assert each["transmittance"].max() < 1e-3
@@ -219,9 +219,9 @@ def test_big_steps_find_the_same_clouds(renderer):
     """
     camera, params = nubis.scenes["fair_weather"]
     small, big = (
-        renderer(48, 27, ref64.fine(192, big_step=b, leap=0.0, empty_samples=6)).render_layers(
-            camera, params
-        )
+        renderer(
+            48, 27, ref64.fine(192, coarse_step=b, sphere_tracing=0.0, empty_before_coarse=6)
+        ).render_layers(camera, params)
         for b in (1, 4)
     )
     assert (small["transmittance"] < 0.9).any()
@@ -232,7 +232,7 @@ def test_big_steps_find_the_same_clouds(renderer):
 
 def _searching(**changes):
     """A method whose steps are small; what it finds depends on how it searches alone."""
-    return ref64.fine(96, steps_horizon=192, empty_samples=6, **changes)
+    return ref64.fine(96, steps_horizon=192, empty_before_coarse=6, **changes)
 
 
 @pytest.mark.slow_after(2)
@@ -281,9 +281,9 @@ def test_leaps_find_the_clouds_of_any_sky(renderer, seed):
     every, big, leaps = (
         renderer(48, 27, method).render_layers(camera, params, time=time)
         for method in (
-            _searching(big_step=1),
-            _searching(big_step=3, leap=0.0),
-            _searching(big_step=3),
+            _searching(coarse_step=1),
+            _searching(coarse_step=3, sphere_tracing=0.0),
+            _searching(coarse_step=3),
         )
     )
     lost = [
@@ -307,9 +307,9 @@ def test_leaps_miss_no_small_cloud(renderer):
         every, big, leaps = (
             renderer(96, 54, method).render_layers(camera, sky)
             for method in (
-                _searching(big_step=1),
-                _searching(big_step=3, leap=0.0),
-                _searching(big_step=3),
+                _searching(coarse_step=1),
+                _searching(coarse_step=3, sphere_tracing=0.0),
+                _searching(coarse_step=3),
             )
         )
         assert (every["transmittance"] < 0.9).any()
@@ -322,13 +322,13 @@ def test_leaps_miss_no_small_cloud(renderer):
 
 @pytest.mark.slow_after(1)
 @pytest.mark.parametrize(
-    ("scene", "changes", "big_step"),
+    ("scene", "changes", "coarse_step"),
     [
         ("grid", {}, 3),
         ("fair_weather", {}, 1),
     ],
 )
-def test_nothing_leaps_where_it_does_not_know(renderer, scene, changes, big_step):
+def test_nothing_leaps_where_it_does_not_know(renderer, scene, changes, coarse_step):
     """In a grid the noise says nothing of what else there is; and a big step of one leaves out
     nothing.
     """
@@ -338,7 +338,7 @@ def test_nothing_leaps_where_it_does_not_know(renderer, scene, changes, big_step
     else:
         camera, params = nubis.scenes[scene]
     on, off = (
-        renderer(32, 18, _searching(big_step=big_step, leap=leap)).render_layers(
+        renderer(32, 18, _searching(coarse_step=coarse_step, sphere_tracing=leap)).render_layers(
             camera, params.with_(**changes)
         )
         for leap in (1.0, 0.0)
@@ -356,7 +356,9 @@ def test_no_leap_goes_into_the_rain(renderer, height):
     params = storm.with_(**{"clouds.rain_extinction": 5e-4})
     camera = looking(height, 8.0 if height < 1000 else -12.0, 50.0)
     every, big, leaps = (
-        renderer(48, 27, _searching(big_step=b, leap=leap)).render_layers(camera, params)
+        renderer(48, 27, _searching(coarse_step=b, sphere_tracing=leap)).render_layers(
+            camera, params
+        )
         for b, leap in ((1, 0.0), (3, 0.0), (3, 0.2))
     )
     lost = [
@@ -465,7 +467,7 @@ def test_a_wide_view_is_made_of_narrow_ones(renderer):
     others.
     """
     params = nubis.Params().with_(**{"clouds.coverage": 0.6})
-    method = nubis.quality("draft").replace(jitter=False, contrast=0.0)
+    method = nubis.quality("draft").replace(jitter=False, adaptive_threshold=0.0)
     whole = renderer(40, 72, method).render(looking(200, 15, 60), params)
     narrow = 2 * np.degrees(np.arctan(np.tan(np.radians(30)) / 3))
     middle = renderer(40, 24, method).render(looking(200, 15, narrow), params)

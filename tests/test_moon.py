@@ -25,7 +25,7 @@ def test_moonlight_is_the_suns_light_path(renderer, model, background):
     clouds hide the sky behind their own white, which mixes colours.
     """
     base = nubis.Params().with_(**{"light.model": model, "sun.visible": False, **DARK})
-    method = nubis.quality("draft").replace(contrast=0.0, path_samples=4)
+    method = nubis.quality("draft").replace(adaptive_threshold=0.0, path_samples=4)
     make = renderer(32, 18, method)
     day = make.render(CAMERA, base, background=background)
     grey = {"moon.irradiance": (3e-5, 3e-5, 3e-5)} if model != "single" else {}
@@ -88,7 +88,7 @@ def test_no_moon_by_default(renderer):
 @pytest.mark.slow
 def test_frames_of_both_are_their_stills(renderer):
     """An animation by two lights, of a static shot, and one whose lights come and go."""
-    make = nubis.Renderer(32, 18, quality=nubis.quality("draft").replace(contrast=0.0))
+    make = nubis.Renderer(32, 18, quality=nubis.quality("draft").replace(adaptive_threshold=0.0))
     params = nubis.Params().with_(**{"sun.elevation": -7.0}, **up())
     still = make.render(CAMERA, params)
     for frame in make.animate((CAMERA, params, 0.0) for _ in range(3)):

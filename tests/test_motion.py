@@ -37,7 +37,7 @@ def rendered(shot, quality="draft", background=None):
 
 
 def all_rays(shot, quality="draft"):
-    return rendered(shot, nubis.quality(quality).replace(contrast=0.0))
+    return rendered(shot, nubis.quality(quality).replace(adaptive_threshold=0.0))
 
 
 def error(frame, still):

@@ -83,3 +83,50 @@ def test_variables_of_the_environment_are_named(monkeypatch, tmp_path):
     # A kernel that nothing has compiled yet.
     with pytest.raises(nubis.NubisError, match=r"NUBIS_SHADERS = .*no file"):
         nubis.testing.probe("x.x * 77.125", [1.0], imports=["no_such_file"])
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "value"),
+    [
+        ("contrast", "adaptive_threshold", 0.2),
+        ("big_step", "coarse_step", 4),
+        ("leap", "sphere_tracing", 0.1),
+        ("empty_samples", "empty_before_coarse", 8),
+        ("light_share", "light_group_weight", 0.05),
+        ("cheap_light", "light_detail_cutoff", 0.5),
+    ],
+)
+def test_deprecated_names_of_settings(old, new, value):
+    expected = nubis.Quality(**{new: value})
+    changed = pytest.warns(DeprecationWarning, match=f"'{old}' is deprecated: it is '{new}' now")
+    with changed:
+        assert nubis.Quality(**{old: value}) == expected
+    with changed:
+        assert nubis.Quality().replace(**{old: value}) == expected
+    with changed:
+        assert getattr(expected, old) == value
+    with changed, pytest.raises(ParameterError, match=f"{old} and {new} are one field"):
+        nubis.Quality(**{old: value, new: value})
+    # Pickles of earlier versions.
+    state = dict(expected.__dict__)
+    state[old] = state.pop(new)
+    copy = nubis.Quality.__new__(nubis.Quality)
+    copy.__setstate__(state)
+    assert copy == expected
+
+
+def test_deprecated_names_of_parameters(tmp_path):
+    expected = nubis.Params().with_(**{"atmosphere.light_shafts": False})
+    changed = pytest.warns(DeprecationWarning, match=r"beams' is deprecated: .*light_shafts' now")
+    with changed:
+        assert nubis.Params().with_(**{"atmosphere.beams": False}) == expected
+    path = tmp_path / "sky.toml"
+    path.write_text("[atmosphere]\nbeams = false\n")
+    with changed:
+        assert nubis.Params.load(path) == expected
+    with changed:
+        assert expected.atmosphere.beams is False
+    with pytest.warns(DeprecationWarning, match="WindVariation"):
+        assert nubis.Wander is nubis.WindVariation
+    with pytest.raises(AttributeError, match="nope"):
+        _ = expected.atmosphere.nope

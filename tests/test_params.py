@@ -441,7 +441,9 @@ def test_tops_are_above_bases(top):
 def test_a_method_with_too_many_samples():
     """More iterations than lavapipe runs without dropping some."""
     with pytest.raises(ParameterError, match=r"quality\.light_steps"):
-        nubis.Renderer(1, 1, quality=Quality(steps_zenith=4096, light_steps=128, light_share=0.0))
+        nubis.Renderer(
+            1, 1, quality=Quality(steps_zenith=4096, light_steps=128, light_group_weight=0.0)
+        )
 
 
 def test_named_methods_can_be_changed():

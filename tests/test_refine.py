@@ -16,7 +16,7 @@ def layers(size, contrast, scene="fair_weather", quality="balanced", **changes):
     target = np.add(eye, (0.3, 1.0, -0.2 if scene == "above" else 0.25))
     camera = nubis.Camera.look_at(eye, target, (0, 0, 1), min(0.1 * size[1], 60.0))
     params = nubis.scenes[scene][1]
-    quality = nubis.quality(quality).replace(contrast=contrast)
+    quality = nubis.quality(quality).replace(adaptive_threshold=contrast)
     return nubis.Renderer(*size, quality=quality).render_layers(camera, params.with_(**changes))
 
 

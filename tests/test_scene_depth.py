@@ -95,7 +95,7 @@ def test_nothing_there_changes_nothing(scene, contrast):
     camera, params = nubis.scenes[scene]
     camera = narrow(camera)
     size = 320, 180
-    quality = nubis.quality("draft").replace(contrast=contrast)
+    quality = nubis.quality("draft").replace(adaptive_threshold=contrast)
     ours = nubis.Renderer(*size, quality=quality)
     plain = ours.render(camera, params)
     depth = np.full(size[::-1], np.inf)
@@ -117,9 +117,9 @@ def test_sample_grids_do_not_reach_across_the_scene():
     y, x = np.mgrid[: size[1], : size[0]]
     depth = np.where((x // 5 + y // 7) % 3 == 0, 1500.0, np.where(x % 31 == 3, 6000.0, np.inf))
     every, adaptive = (
-        nubis.Renderer(*size, quality=nubis.quality("draft").replace(contrast=c)).render_layers(
-            camera, params, scene_depth=depth
-        )
+        nubis.Renderer(
+            *size, quality=nubis.quality("draft").replace(adaptive_threshold=c)
+        ).render_layers(camera, params, scene_depth=depth)
         for c in (0.0, 0.2)
     )
     assert (adaptive["samples"] == 0).mean() > 0.1 + (every["samples"] == 0).mean()
@@ -185,7 +185,7 @@ def test_air_before_the_scene_is_a_part_of_all_air():
 def test_partial_cover_is_a_mixture():
     """A pixel covered in part is so much of the covered picture and the rest of the open one."""
     camera, params = nubis.scenes["fair_weather"]
-    ours = nubis.Renderer(64, 36, quality=nubis.quality("draft").replace(contrast=0.0))
+    ours = nubis.Renderer(64, 36, quality=nubis.quality("draft").replace(adaptive_threshold=0.0))
     rng = np.random.default_rng(5)
     cover = rng.uniform(0, 1, (36, 64)) * (rng.uniform(size=(36, 64)) < 0.8)
     cover[rng.uniform(size=(36, 64)) < 0.2] = 1.0
@@ -234,7 +234,7 @@ def test_strips_read_their_own_rows():
 
 
 # Of an animation, pixels whose every ray is marched: the still is what they are compared with.
-EVERY = nubis.quality("draft").replace(contrast=0.0)
+EVERY = nubis.quality("draft").replace(adaptive_threshold=0.0)
 CLOUDY = (
     nubis.scenes["fair_weather"][0],
     nubis.scenes["fair_weather"][1].with_(**{"clouds.coverage": 0.75, "high_clouds.coverage": 0.0}),

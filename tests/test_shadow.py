@@ -149,7 +149,7 @@ def seen_ground(camera, params, time=0.0, **changes):
     """The radiance behind the clouds, and behind air that is not shaded."""
     quality = nubis.quality("draft").replace(steps_zenith=8, steps_horizon=8, light_steps=1)
     ours = nubis.Renderer(*SIZE, quality=quality)
-    params = params.with_(**{"atmosphere.beams": False}, **changes)
+    params = params.with_(**{"atmosphere.light_shafts": False}, **changes)
     sky = ours.render_layers(camera, params, time=time)["sky"]
     return sky.reshape(-1, 3).astype(np.float64)
 
@@ -267,7 +267,7 @@ def test_what_sees_no_ground_bakes_nothing():
     has been baked stays.
     """
     params = nubis.Params().with_(**{"wind.speed": 20.0, "wind.weather_speed": 20.0})
-    params = params.with_(**{"atmosphere.beams": False})
+    params = params.with_(**{"atmosphere.light_shafts": False})
     up = nubis.Camera.look_at((0, 0, 100), (0, 1000, 900), (0, 0, 1), 40.0)
     ours = nubis.Renderer(*SIZE, quality="draft")
 
@@ -276,7 +276,7 @@ def test_what_sees_no_ground_bakes_nothing():
         return "shadow_ground" in ours.timings
 
     assert not bakes(up)
-    assert bakes(up, **{"atmosphere.beams": True})
+    assert bakes(up, **{"atmosphere.light_shafts": True})
     assert not bakes(DOWN, **{"sun.elevation": -20.0})
     assert not bakes(DOWN, background=None)
     assert not bakes(DOWN, **{"atmosphere.ground_shadows": False})

@@ -376,7 +376,7 @@ def test_any_animation(data):
     """
     size = data.draw(st.sampled_from([(1, 1), (5, 3), (8, 6), (1, 9), (17, 2)]))
     # Without contrast: the frames of an animation become the still in which every pixel is marched.
-    balanced = nubis.quality("balanced").replace(path_samples=2, contrast=0.0)
+    balanced = nubis.quality("balanced").replace(path_samples=2, adaptive_threshold=0.0)
     make = renderer(size, data.draw(st.sampled_from([DRAFT, balanced])))
     background = data.draw(st.sampled_from(["sky", None]))
     params = data.draw(strategies.params())

@@ -276,10 +276,10 @@ def any_sky(rng, params):
             "wind.updraft": rng.uniform(-3, 3),
             "wind.weather_direction": rng.uniform(-360, 360),
             "wind.weather_speed": rng.uniform(-30, 30),
-            "wander.wind": rng.uniform(0, 1),
-            "wander.coverage": rng.uniform(0, 0.2),
-            "wander.period": log_uniform(600, 30_000),
-            "wander.seed": int(rng.integers(2**32)),
+            "wind_variation.wind": rng.uniform(0, 1),
+            "wind_variation.coverage": rng.uniform(0, 0.2),
+            "wind_variation.period": log_uniform(600, 30_000),
+            "wind_variation.seed": int(rng.integers(2**32)),
             "weather.clear_at": tuple(rng.uniform(-60_000, 60_000, 2)),
             "weather.clear_radius": log_uniform(3000, 30_000),
             "atmosphere.planet_radius": log_uniform(400_000, 6_371_000),
@@ -371,8 +371,8 @@ def test_extinction(renderer, noise_params, seed, time, kind, edge):
     params = params.with_(**added(rng, kind))
     points, heights = points_about_the_shell(rng, params, 1000)
     # The ref64 follows each swing: ten thousand at most.
-    period = max(params.wander.period, abs(time) / 1e4)
-    params = params.with_(**{"wander.period": period})
+    period = max(params.wind_variation.period, abs(time) / 1e4)
+    params = params.with_(**{"wind_variation.period": period})
     deck = params.upper_clouds
     largest = max(
         params.clouds.extinction,

@@ -13,7 +13,7 @@ from nubis.testing import probe
 MONTH = 2.6e6  # s
 # A whole number of every tile, m: the ref64 of a point may be any number of these away.
 TILE = 60_000.0
-WANDER = {"wander.wind": 0.6, "wander.coverage": 0.0, "wander.seed": 5}
+WANDER = {"wind_variation.wind": 0.6, "wind_variation.coverage": 0.0, "wind_variation.seed": 5}
 
 
 def alike(direction, speed, **changes):
@@ -240,7 +240,11 @@ def test_cover_wanders_in_the_picture(renderer):
 
     def pair(swing, mean, time):
         plain = nubis.Params().with_(**still)
-        changes = {"wander.coverage": swing, "wander.seed": 4, "clouds.coverage": mean}
+        changes = {
+            "wind_variation.coverage": swing,
+            "wind_variation.seed": 4,
+            "clouds.coverage": mean,
+        }
         wandering = plain.with_(**changes)
         cover = ref64_noise.cover(wandering, time)
         steady = plain.with_(**{"clouds.coverage": cover})
@@ -260,7 +264,7 @@ def test_cover_wanders_in_the_picture(renderer):
     assert np.argsort(covers).tolist() == np.argsort(opacities).tolist()
 
     times = np.arange(0, 100_000, 600.0)
-    wild = nubis.Params().with_(**{"wander.coverage": 1.0, "wander.seed": 4})
+    wild = nubis.Params().with_(**{"wind_variation.coverage": 1.0, "wind_variation.seed": 4})
     ends = [ref64_noise.cover(wild, time) for time in times]
     for end, time in ((0.0, times[np.argmin(ends)]), (1.0, times[np.argmax(ends)])):
         cover, wandering, steady = pair(1.0, 0.45, time)
@@ -276,7 +280,7 @@ def test_what_does_not_wander_stays(renderer):
     camera, params = nubis.scenes["fair_weather"]
 
     def picture(**wander):
-        sky = params.with_(**{f"wander.{name}": value for name, value in wander.items()})
+        sky = params.with_(**{f"wind_variation.{name}": value for name, value in wander.items()})
         return renderer().render(camera, sky, time=3000.0).tobytes()
 
     assert picture() == picture(seed=1) == picture(period=100.0)
@@ -294,9 +298,9 @@ def test_an_animation_of_a_wandering_wind_stays_near_the_still(renderer):
     gale = {f"wind.{kind}speed": 100.0 for kind in ("", "detail_", "weather_")}
     params = nubis.Params().with_(
         **gale,
-        **{"wind.updraft": 0.0, "high_clouds.coverage": 0.0, "wander.wind": 1.0},
+        **{"wind.updraft": 0.0, "high_clouds.coverage": 0.0, "wind_variation.wind": 1.0},
     )
-    rate, phase = ref64_noise.turns(params.wander, 0)
+    rate, phase = ref64_noise.turns(params.wind_variation, 0)
     times = np.arange(0, 500_000, 60.0)
     speeds = np.abs(1 + np.exp(1j * (rate * times[:, None] + phase)).mean(axis=1))
     assert speeds.min() < 0.2
@@ -310,7 +314,7 @@ def test_an_animation_of_a_wandering_wind_stays_near_the_still(renderer):
 
 
 @pytest.mark.slow_after(1)
-@pytest.mark.parametrize("wander", [{}, {"wander.wind": 1.0}], ids=["steady", "wandering"])
+@pytest.mark.parametrize("wander", [{}, {"wind_variation.wind": 1.0}], ids=["steady", "wandering"])
 def test_shadows_drift_with_the_wind(wander):
     """Those on the ground are baked every 600 m of the eye's way and every 32 m of the fastest that
     the wind may blow, and read where they have drifted to since: half way between the weather and
@@ -318,7 +322,7 @@ def test_shadows_drift_with_the_wind(wander):
     """
     params = nubis.Params().with_(
         **wander,
-        **{"wind.direction": 90.0, "wind.speed": 20.0, "wander.period": 600.0},
+        **{"wind.direction": 90.0, "wind.speed": 20.0, "wind_variation.period": 600.0},
     )
 
     def drift(time):
@@ -328,7 +332,7 @@ def test_shadows_drift_with_the_wind(wander):
             shape + ref64_noise.blown(params, wind.weather_direction, wind.weather_speed, time)
         )
 
-    period = 32.0 / (20.0 * (1.0 + params.wander.wind))
+    period = 32.0 / (20.0 * (1.0 + params.wind_variation.wind))
     for time in (0.0, 0.6, 333.3, 5000.1, MONTH + 0.4):
         baked = np.floor(time / period) * period
         for eye, place in [((0.0, 0.0), (0.0, 0.0)), ((299.0, -1510.0), (0.0, -1800.0))]:

@@ -52,9 +52,9 @@ from nubis.params import (
     Quality,
     Sun,
     UpperClouds,
-    Wander,
     Weather,
     Wind,
+    WindVariation,
 )
 
 # At import: settings of the driver must precede its loading and the start of threads.
@@ -94,11 +94,11 @@ __all__ = [
     "Sun",
     "SunVisibility",
     "UpperClouds",
-    "Wander",
     "Weather",
     "WeatherBlend",
     "WeatherChange",
     "Wind",
+    "WindVariation",
     "adapters",
     "auto_exposure",
     "distance_from_z",
@@ -114,3 +114,13 @@ __all__ = [
     "sky",
     "to_srgb8",
 ]
+
+
+def __getattr__(name: str) -> object:
+    if name == "Wander":
+        import warnings
+
+        message = "nubis.Wander is deprecated: it is nubis.WindVariation now"
+        warnings.warn(message, DeprecationWarning, stacklevel=2)
+        return WindVariation
+    raise AttributeError(f"module 'nubis' has no attribute {name!r}")

@@ -9,17 +9,26 @@ import os
 import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
 from nubis import _nubis
 from nubis._errors import FileError, ParameterError
-from nubis._names import refuse_arguments, unknown_field
+from nubis._names import RENAMED, current_names, refuse_arguments, unknown_field
 from nubis._nubis import DensityGrid
 
 
-class Base:
+class _Renaming(type):
+    """Class whose constructor takes deprecated names of fields."""
+
+    if not TYPE_CHECKING:
+
+        def __call__(cls, *args: Any, **given: Any) -> Any:
+            return super().__call__(*args, **current_names(given))
+
+
+class Base(metaclass=_Renaming):
     """A frozen dataclass with comparison and hash by value, arrays included."""
 
     __dataclass_fields__: ClassVar[dict[str, dataclasses.Field[Any]]]
@@ -42,10 +51,19 @@ class Base:
         >>> sun = nubis.Sun().replace(elevation=5.0)
         """
         names = [f.name for f in dataclasses.fields(self)]
+        changes = current_names(changes)
         for name, value in changes.items():
             if name not in names:
                 raise _unknown(f"{type(self).__name__}.{name}", value, names)
         return dataclasses.replace(self, **changes)
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            # Only for names that are no attribute.
+            if RENAMED.get(name) in self.__dataclass_fields__:
+                return getattr(self, next(iter(current_names({name: None}))))
+            raise AttributeError(f"{type(self).__name__!r} has no attribute {name!r}")
 
     def _key(self) -> tuple[Any, ...]:
         values = (getattr(self, f.name) for f in dataclasses.fields(self))
@@ -53,6 +71,7 @@ class Base:
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         # A pickle of another version may have further fields.
+        state = {RENAMED.get(name, name): value for name, value in state.items()}
         names = [f.name for f in dataclasses.fields(self)]
         for name, value in state.items():
             if name not in names:
@@ -125,6 +144,7 @@ class Root(Base):
         --------
         >>> params = nubis.Params().with_(**{"clouds.coverage": 0.7, "sun.elevation": 20.0})
         """
+        changes = current_names(changes)
         blocks: dict[str, dict[str, Any]] = {}
         groups = [f.name for f in dataclasses.fields(self)]
         for path, value in changes.items():

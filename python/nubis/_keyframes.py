@@ -43,8 +43,8 @@ class Keyframes:
     ------
     ParameterError
         Without keys, for two keys of the same time, a time that is not finite, or a key that is no
-        `Params`; if winds that wander change over more than 16,384 times `wander.period` between
-        two keys.
+        `Params`; if winds that wander change over more than 16,384 times `wind_variation.period`
+        between two keys.
 
     Examples
     --------

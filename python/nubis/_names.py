@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import difflib
+import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, TypeVar
 
+from nubis import _nubis
 from nubis._errors import ParameterError
 
 Value = TypeVar("Value")
@@ -15,6 +17,24 @@ GONE = {
     "sun_volume": 'nubis.quality("balanced") takes less time and, but for storms, errs less',
     "view_distance": "clouds are drawn to the horizon from any altitude",
 }
+
+
+# Deprecated names of blocks and fields, and their names now.
+RENAMED: dict[str, str] = _nubis.renamed()
+
+
+def current_names(given: Mapping[str, Value]) -> dict[str, Value]:
+    """Values by field name or dotted path, with deprecated names replaced."""
+    values: dict[str, Value] = {}
+    for path, value in given.items():
+        current = ".".join(RENAMED.get(part, part) for part in str(path).split("."))
+        if current != path:
+            message = f"{path!r} is deprecated: it is {current!r} now"
+            warnings.warn(message, DeprecationWarning, stacklevel=3)
+            if current in given:
+                raise ParameterError(f"{path} and {current} are one field: only one is allowed")
+        values[current] = value
+    return values
 
 
 class UnknownKeyError(ParameterError, KeyError):

@@ -31,6 +31,7 @@ __all__ = [
     "number",
     "quality",
     "read_pixels",
+    "renamed",
     "same_winds",
     "to_srgb8",
     "write_bytes",
@@ -311,6 +312,9 @@ def number(name: str, value: object) -> float:
 def quality(name: str) -> dict[str, Any]: ...
 def read_pixels(path: str | PathLike[str]) -> npt.NDArray[np.float32]:
     """Pixels of a PNG, HDR or EXR file, shape (H, W, 1) or (H, W, 3)."""
+
+def renamed() -> dict[str, str]:
+    """Deprecated names of fields, and their names now."""
 
 def same_winds(a: Params, b: Params) -> bool:
     """Whether two skies have the same winds."""

@@ -95,7 +95,7 @@ def quality(name: str) -> Quality:
 
     Examples
     --------
-    >>> method = nubis.quality("balanced").replace(contrast=0.0)
+    >>> method = nubis.quality("balanced").replace(adaptive_threshold=0.0)
     >>> renderer = nubis.Renderer(960, 540, quality=method)
     """
     if not isinstance(name, str):
@@ -347,11 +347,11 @@ class Renderer:
         A frame marches one pixel in sixteen. The other pixels are reprojected from the history, and
         interpolated or marched where the history is rejected. The first frame and the first frame
         after a cut are stills. A static shot converges to the still in which every pixel is marched
-        (``contrast=0``).
+        (``adaptive_threshold=0``).
 
-        With ``contrast=1``, as in ``"preview"``, and pixels narrower than an eighth of a degree, a
-        frame marches one pixel in sixty-four and reprojects one in sixteen. Its frames are
-        upsampled from these pixels, as its stills are, so that a static shot equals the still.
+        With ``adaptive_threshold=1``, as in ``"preview"``, and pixels narrower than an eighth of a
+        degree, a frame marches one pixel in sixty-four and reprojects one in sixteen. Its frames
+        are upsampled from these pixels, as its stills are, so that a static shot equals the still.
 
         With integrator ``"path"`` or ``"reference"`` every frame is a still. A static shot
         accumulates paths: noise decreases from frame to frame.
@@ -431,9 +431,9 @@ class Renderer:
         directly: marched in this frame, or marched in an earlier one and reprojected since. Less is
         the number of frames since the pixel was interpolated from the samples around it; 1 is an
         interpolated pixel of this frame, such as a disoccluded one. If one pixel in sixteen is
-        reprojected (``contrast=1``), all sixteen pixels of a block have the value of the first,
-        which grows by 4 per frame. None if nothing is reprojected: before the first frame, without
-        clouds, and with the integrators ``"reference"`` and ``"path"``.
+        reprojected (``adaptive_threshold=1``), all sixteen pixels of a block have the value of the
+        first, which grows by 4 per frame. None if nothing is reprojected: before the first frame,
+        without clouds, and with the integrators ``"reference"`` and ``"path"``.
         """
         return self._core.history_length()
 

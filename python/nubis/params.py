@@ -326,7 +326,7 @@ class Wind(Block):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Wander(Block):
+class WindVariation(Block):
     """Slow variation of winds and cloud cover over hours (gems2001): the mean of four sinusoids of
     incommensurate periods, in closed form for any time.
 
@@ -579,7 +579,7 @@ class Atmosphere(Block):
         number from 0 to 10.
     ground_shadows : bool
         Whether clouds cast shadows on the visible ground. Allowed: True or False.
-    beams : bool
+    light_shafts : bool
         Whether clouds cast shadows on the air: light shafts (crepuscular rays). Allowed: True or
         False.
     ground_albedo : tuple[float, float, float]
@@ -596,7 +596,7 @@ class Atmosphere(Block):
     haze: float = 1.0
     aerial_perspective: float = 1.0
     ground_shadows: bool = True
-    beams: bool = True
+    light_shafts: bool = True
     ground_albedo: tuple[float, float, float] = (0.1, 0.12, 0.07)
     night: tuple[float, float, float] = (0.000000027, 0.00000002, 0.000000014)
 
@@ -620,23 +620,23 @@ class Quality(Block):
     step_growth : float
         Growth of the view steps with distance: 0 makes all steps of a ray equal, 1 makes a step a
         fixed fraction of its distance. Allowed: a number from 0 to 1.
-    big_step : int
+    coarse_step : int
         Length of a coarse step outside clouds, in view steps. On a hit the march goes back by the
         coarse step. Allowed: a whole number from 1 to 16.
-    leap : float
-        Sphere-tracing factor for steps through clear air longer than `big_step` (Hart 1996): the
+    sphere_tracing : float
+        Sphere-tracing factor for steps through clear air longer than `coarse_step` (Hart 1996): the
         step per unit by which the base shape falls short of cloud, as a fraction of
         `clouds.shape_scale` (of `weather.scale`, or of 2.5 texels of `weather.map`, if that is
-        less). On a hit the march goes back. 0 limits steps to `big_step`. Longer steps are off
-        where `big_step` is 1, in grids and in rain. Allowed: a number from 0 to 1.
-    empty_samples : int
+        less). On a hit the march goes back. 0 limits steps to `coarse_step`. Longer steps are off
+        where `coarse_step` is 1, in grids and in rain. Allowed: a number from 0 to 1.
+    empty_before_coarse : int
         Number of consecutive full samples of zero density before the march takes coarse steps
         (nubis2015: 6). Allowed: a whole number from 1 to 4096.
     light_steps : int
         Number of light samples toward the sun, without the far sample. Where they reach to the end
         of the clouds (`light_distance` 0), points below a second deck take a third more, for that
         deck. Allowed: a whole number from 1 to 128.
-    light_share : float
+    light_group_weight : float
         Light-group weight: consecutive view samples are lit as a group, by light samples from one
         point, once their opacity in the pixel exceeds this share. 0 lights each view sample by
         itself. Allowed: a number from 0 to 1.
@@ -649,7 +649,7 @@ class Quality(Block):
     cone : float
         Half-width of the cone of the light samples, as a fraction of its length (nubis2015); 0
         places them on a straight line to the sun. Allowed: a number from 0 to 1.
-    cheap_light : float
+    light_detail_cutoff : float
         Detail cut-off of the light samples: opacity in front of a view sample above which its light
         samples omit the detail noise (nubis2015: 0.3). Light samples that reach to the end of the
         clouds also omit it wherever they stand for most of a tile of the detail noise. Allowed: a
@@ -657,7 +657,7 @@ class Quality(Block):
     min_transmittance : float
         Transmittance at which a ray ends. Its radiance is then scaled up to full opacity, so that
         the remaining light is not lost. Allowed: a number from 0 to 0.5.
-    contrast : float
+    adaptive_threshold : float
         Threshold for adaptive sampling: a pixel is marched if the contrast between neighbouring
         samples exceeds it. 0 marches every pixel; 1 marches only the initial grid and upsamples.
         The initial grid has one pixel in sixteen if pixels are narrower than an eighth of a degree,
@@ -689,17 +689,17 @@ class Quality(Block):
     steps_zenith: int = 134
     steps_horizon: int = 320
     step_growth: float = 1.0
-    big_step: int = 5
-    leap: float = 0.2
-    empty_samples: int = 6
+    coarse_step: int = 5
+    sphere_tracing: float = 0.2
+    empty_before_coarse: int = 6
     light_steps: int = 16
-    light_share: float = 0.15
+    light_group_weight: float = 0.15
     light_distance: float = 0.0
     far_sample: bool = False
     cone: float = 0.0
-    cheap_light: float = 1.0
+    light_detail_cutoff: float = 1.0
     min_transmittance: float = 0.01
-    contrast: float = 0.3
+    adaptive_threshold: float = 0.3
     jitter: bool = True
     tolerance: float = 0.001
     path_samples: int = 64
@@ -727,7 +727,7 @@ class Params(Root):
         The weather map: coverage, type and precipitation by place.
     wind : Wind
         Winds that carry the base shapes, the detail and the weather map.
-    wander : Wander
+    wind_variation : WindVariation
         Slow variation of winds and cloud cover over hours (gems2001): the mean of four sinusoids of
         incommensurate periods, in closed form for any time.
     drift : Drift
@@ -757,7 +757,7 @@ class Params(Root):
     upper_clouds: UpperClouds = field(default_factory=UpperClouds)
     weather: Weather = field(default_factory=Weather)
     wind: Wind = field(default_factory=Wind)
-    wander: Wander = field(default_factory=Wander)
+    wind_variation: WindVariation = field(default_factory=WindVariation)
     drift: Drift = field(default_factory=Drift)
     high_clouds: HighClouds = field(default_factory=HighClouds)
     light: Light = field(default_factory=Light)

@@ -30,7 +30,7 @@ fn optical_depth_to_sun(p: vec3f, opacity: f32, width: f32) -> f32 {
     // Cheap samples leave out the detail. Behind much cloud all samples are cheap. So are samples whose segment covers
     // most of a tile of the detail, over which the detail averages out.
     let fine = detailed_samples(samples);
-    let full = select(0u, fine, opacity < params.quality.cheap_light);
+    let full = select(0u, fine, opacity < params.quality.light_detail_cutoff);
     // The test at the end of the loop: lavapipe runs a loop that is tested at its start once more for nothing.
     var i = 0u;
     if LIGHT_DETAIL && full > 0u {

@@ -25,7 +25,7 @@ pub(crate) type Casters = (
     [f32; 2],
     (params::Clouds, params::UpperClouds),
     (params::Weather, Vec<(params::Weather, f32)>),
-    (params::Wind, params::Wander, params::Drift),
+    (params::Wind, params::WindVariation, params::Drift),
 );
 
 /// Shadow casters of a sky.
@@ -34,7 +34,7 @@ pub(crate) fn casters(params: &Params) -> Casters {
         [params.sun.elevation, params.sun.azimuth],
         (params.clouds.clone(), params.upper_clouds.clone()),
         (params.weather.clone(), params.weather_mix.clone()),
-        (params.wind.clone(), params.wander.clone(), params.drift.clone()),
+        (params.wind.clone(), params.wind_variation.clone(), params.drift.clone()),
     )
 }
 

@@ -149,7 +149,7 @@ fn cloud_top(params: &Params) -> f64 {
 }
 
 /// Shortest scale of variation of the base shape in m: of the noise and of each weather. In a user's map the cover may
-/// change from 0 to 1 within a texel, and the scale is 2.5 texels: leaps by a fifth of it (`quality.leap`) reach half a
+/// change from 0 to 1 within a texel, and the scale is 2.5 texels: leaps by a fifth of it (`quality.sphere_tracing`) reach half a
 /// texel. Measured on islands of one texel: leaps by a whole texel miss one and a half times as many islands as
 /// coarse steps do.
 fn leap_scale(params: &Params) -> f32 {
@@ -386,7 +386,7 @@ impl Frame {
         let dip = ((radius + top) / (radius + f64::from(self.view.altitude)).max(1.0)).min(1.0).acos();
         let inside = f64::from(self.view.altitude) <= top;
         let lit = self.sun_above(params, top);
-        air.beams && air.enabled && params.has_clouds() && lit && (inside || self.sees_below(camera, dip))
+        air.light_shafts && air.enabled && params.has_clouds() && lit && (inside || self.sees_below(camera, dip))
     }
 
     /// Whether any ray of the picture goes below a horizon, with a margin of half a degree. `dip` is the depression of

@@ -276,7 +276,7 @@ params! {
 
     /// Slow variation of winds and cloud cover over hours (gems2001): the mean of four sinusoids of incommensurate
     /// periods, in closed form for any time.
-    Wander {
+    WindVariation {
         /// Amplitude of the variation of all winds in speed and direction, as a fraction of their speed: at 0.5 a
         /// wind blows at 0.5 to 1.5 times its speed and within 30 degrees of its direction. All winds vary alike.
         /// Wind shear does not vary.
@@ -421,7 +421,7 @@ params! {
         /// Whether clouds cast shadows on the visible ground.
         ground_shadows: bool = true;
         /// Whether clouds cast shadows on the air: light shafts (crepuscular rays).
-        beams: bool = true;
+        light_shafts: bool = true;
         /// Albedo of the ground (linear, Rec. 709 primaries).
         ground_albedo: [f32; 3] = [0.10, 0.12, 0.07], in 0..=1 "";
         /// Radiance of the night sky above the atmosphere (airglow and stars), present by day too. The default
@@ -444,20 +444,20 @@ params! {
         /// of its distance.
         step_growth: f32 = 1.0, in 0..=1 "";
         /// Length of a coarse step outside clouds, in view steps. On a hit the march goes back by the coarse step.
-        big_step: u32 = 5, in 1..=16 "";
-        /// Sphere-tracing factor for steps through clear air longer than `big_step` (Hart 1996): the step per unit by
+        coarse_step: u32 = 5, in 1..=16 "";
+        /// Sphere-tracing factor for steps through clear air longer than `coarse_step` (Hart 1996): the step per unit by
         /// which the base shape falls short of cloud, as a fraction of `clouds.shape_scale` (of `weather.scale`, or
         /// of 2.5 texels of `weather.map`, if that is less). On a hit the march goes back. 0 limits steps to
-        /// `big_step`. Longer steps are off where `big_step` is 1, in grids and in rain.
-        leap: f32 = 0.2, in 0..=1 "";
+        /// `coarse_step`. Longer steps are off where `coarse_step` is 1, in grids and in rain.
+        sphere_tracing: f32 = 0.2, in 0..=1 "";
         /// Number of consecutive full samples of zero density before the march takes coarse steps (nubis2015: 6).
-        empty_samples: u32 = 6, in 1..=4096 "";
+        empty_before_coarse: u32 = 6, in 1..=4096 "";
         /// Number of light samples toward the sun, without the far sample. Where they reach to the end of the clouds
         /// (`light_distance` 0), points below a second deck take a third more, for that deck.
         light_steps: u32 = 16, in 1..=128 "";
         /// Light-group weight: consecutive view samples are lit as a group, by light samples from one point, once
         /// their opacity in the pixel exceeds this share. 0 lights each view sample by itself.
-        light_share: f32 = 0.15, in 0..=1 "";
+        light_group_weight: f32 = 0.15, in 0..=1 "";
         /// Reach of the light samples; 0 extends them to the end of the clouds.
         light_distance: f32 = 0.0, in 0..=100000 "m";
         /// Whether a further light sample is taken at three times the reach of the others, for shadows of distant
@@ -469,7 +469,7 @@ params! {
         /// Detail cut-off of the light samples: opacity in front of a view sample above which its light samples omit
         /// the detail noise (nubis2015: 0.3). Light samples that reach to the end of the clouds also omit it wherever
         /// they stand for most of a tile of the detail noise.
-        cheap_light: f32 = 1.0, in 0..=1 "";
+        light_detail_cutoff: f32 = 1.0, in 0..=1 "";
         /// Transmittance at which a ray ends. Its radiance is then scaled up to full opacity, so that the remaining
         /// light is not lost.
         min_transmittance: f32 = 0.01, in 0..=0.5 "";
@@ -480,7 +480,7 @@ params! {
         /// background (sky, ground, and high clouds seen from below) is evaluated at every fourth pixel in both
         /// directions if pixels are narrower than an eighth of a degree, and at every pixel where its second
         /// difference exceeds a tenth of the threshold and along edges; 0 evaluates every pixel.
-        contrast: f32 = 0.3, in 0..=1 "";
+        adaptive_threshold: f32 = 0.3, in 0..=1 "";
         /// Whether the start of each ray is jittered by blue noise of up to one view step.
         jitter: bool = true;
         /// Tolerance of the integrator `reference`: the steps are halved until no pixel changes by more than this
@@ -495,6 +495,18 @@ params! {
     }
 }
 
+/// Deprecated names of blocks and fields, and their names now. Python and TOML files may have either.
+pub const RENAMED: [(&str, &str); 8] = [
+    ("beams", "light_shafts"),
+    ("big_step", "coarse_step"),
+    ("cheap_light", "light_detail_cutoff"),
+    ("contrast", "adaptive_threshold"),
+    ("empty_samples", "empty_before_coarse"),
+    ("leap", "sphere_tracing"),
+    ("light_share", "light_group_weight"),
+    ("wander", "wind_variation"),
+];
+
 /// All parameters of a sky.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[expect(missing_docs, reason = "each block says what it is")]
@@ -505,7 +517,7 @@ pub struct Params {
     pub upper_clouds: UpperClouds,
     pub weather: Weather,
     pub wind: Wind,
-    pub wander: Wander,
+    pub wind_variation: WindVariation,
     pub drift: Drift,
     pub high_clouds: HighClouds,
     pub light: Light,
@@ -584,7 +596,7 @@ impl Params {
             ("upper_clouds", &self.upper_clouds),
             ("weather", &self.weather),
             ("wind", &self.wind),
-            ("wander", &self.wander),
+            ("wind_variation", &self.wind_variation),
             ("drift", &self.drift),
             ("high_clouds", &self.high_clouds),
             ("light", &self.light),
@@ -601,7 +613,7 @@ impl Params {
             ("upper_clouds", &mut self.upper_clouds),
             ("weather", &mut self.weather),
             ("wind", &mut self.wind),
-            ("wander", &mut self.wander),
+            ("wind_variation", &mut self.wind_variation),
             ("drift", &mut self.drift),
             ("high_clouds", &mut self.high_clouds),
             ("light", &mut self.light),
@@ -852,7 +864,7 @@ pub fn block(type_name: &str) -> Option<Box<dyn Block>> {
         upper_clouds,
         weather,
         wind,
-        wander,
+        wind_variation,
         drift,
         high_clouds,
         light,
@@ -869,7 +881,7 @@ pub fn block(type_name: &str) -> Option<Box<dyn Block>> {
         Box::new(upper_clouds),
         Box::new(weather),
         Box::new(wind),
-        Box::new(wander),
+        Box::new(wind_variation),
         Box::new(drift),
         Box::new(high_clouds),
         Box::new(light),

@@ -9,29 +9,31 @@ pub(crate) fn quality(name: &str) -> Option<Quality> {
         steps_zenith: 64,
         steps_horizon: 128,
         step_growth: 0.0,
-        big_step: 1,
-        leap: 0.0,
+        coarse_step: 1,
+        sphere_tracing: 0.0,
         light_steps: 5,
-        light_share: 0.0,
+        light_group_weight: 0.0,
         light_distance: 700.0,
         far_sample: true,
         cone: 0.12,
-        cheap_light: 0.3,
-        contrast: 0.0,
+        light_detail_cutoff: 0.3,
+        adaptive_threshold: 0.0,
         ..Quality::default()
     };
     match name {
         // "A sample and five more in a cone"; the sixth is the far one.
         "nubis2015" => Some(published),
         // Options A to D of the text: coarse steps of three, ten empty samples, light samples with full detail.
-        "thesis2018" => Some(Quality { big_step: 3, empty_samples: 10, cheap_light: 1.0, ..published }),
+        "thesis2018" => {
+            Some(Quality { coarse_step: 3, empty_before_coarse: 10, light_detail_cutoff: 1.0, ..published })
+        }
         "vsu2022" => Some(Quality {
             steps_zenith: 250,
             steps_horizon: 250,
             light_steps: 64,
             light_distance: 2000.0,
             far_sample: false,
-            cheap_light: 1.0,
+            light_detail_cutoff: 1.0,
             ..published
         }),
         _ => None,

@@ -16,25 +16,27 @@ impl Quality {
         let draft = Self {
             steps_zenith: 80,
             steps_horizon: 192,
-            big_step: 3,
+            coarse_step: 3,
             light_steps: 10,
             min_transmittance: 0.03,
-            contrast: 0.5,
+            adaptive_threshold: 0.5,
             path_samples: 16,
             ..balanced.clone()
         };
         Ok(match name {
             "balanced" => balanced,
             "draft" => draft,
-            "preview" => Self { steps_zenith: 54, steps_horizon: 128, light_steps: 8, contrast: 1.0, ..draft },
+            "preview" => {
+                Self { steps_zenith: 54, steps_horizon: 128, light_steps: 8, adaptive_threshold: 1.0, ..draft }
+            }
             "high" => Self {
                 steps_zenith: 192,
                 steps_horizon: 512,
-                big_step: 3,
+                coarse_step: 3,
                 light_steps: 48,
-                light_share: 0.01,
+                light_group_weight: 0.01,
                 min_transmittance: 0.002,
-                contrast: 0.0,
+                adaptive_threshold: 0.0,
                 path_samples: 256,
                 ..balanced
             },
@@ -54,7 +56,7 @@ impl Quality {
         // Growing steps may be twice as many (passes/march.wgsl).
         let steps = self.steps_zenith.max(self.steps_horizon) * if self.step_growth > 0.0 { 2 } else { 1 };
         // What is lit as one has gathered more than its share; the rest of the ray is one more.
-        let groups = (1.0 / self.light_share + 1.0).min(steps as f32) as u32;
+        let groups = (1.0 / self.light_group_weight + 1.0).min(steps as f32) as u32;
         2 * steps + groups * (1 + self.light_steps)
     }
 

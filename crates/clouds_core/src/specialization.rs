@@ -56,7 +56,7 @@ fn of_sky(params: &Params, quality: &Quality) -> Specialization {
     let on = |on: bool| f64::from(u8::from(on));
     let light = &params.light;
     let volume = params.volume.is_some();
-    let cheap = quality.cheap_light < 1.0 || quality.far_sample || quality.light_distance <= 0.0;
+    let cheap = quality.light_detail_cutoff < 1.0 || quality.far_sample || quality.light_distance <= 0.0;
     Specialization::new(
         [
             ("PHASE", f64::from(light.phase as u32)),
@@ -70,7 +70,7 @@ fn of_sky(params: &Params, quality: &Quality) -> Specialization {
             ("UPPER", on(params.has_upper_clouds())),
             ("LARGE_SCALE_WEATHER", on(params.has_large_scale_weather())),
             ("PROFILE_TABLE", on(params.clouds.profile.is_some() && !volume)),
-            ("LIGHT_DETAIL", on(quality.cheap_light > 0.0)),
+            ("LIGHT_DETAIL", on(quality.light_detail_cutoff > 0.0)),
             ("LIGHT_CHEAP", on(cheap)),
             ("WEATHER_NOISE", f64::from(WeatherNoise::WorleyPerlin as u32)),
             ("HIGH_LOW_SUN", 0.0),

@@ -111,7 +111,7 @@ crate::params! {
         upper_shown: f32 = 0.0;
         /// Fraction of the way to the ground that rain falls.
         rain_reach: f32 = 0.0;
-        /// Shortest scale of variation of the base shape, m; `quality.leap` is relative to it.
+        /// Shortest scale of variation of the base shape, m; `quality.sphere_tracing` is relative to it.
         leap_scale: f32 = 1.0;
         /// Extinction at density 1: the largest of clouds, upper deck and rain, 1/m.
         extinction: f32 = 0.0;

@@ -8,14 +8,14 @@ use glam::{DVec2, DVec3};
 
 use crate::directions::compass;
 use crate::error::{Error, Result};
-use crate::params::{Drift, HighClouds, Params, UpperClouds, Wander, Wind};
+use crate::params::{Drift, HighClouds, Params, UpperClouds, Wind, WindVariation};
 use crate::schema::Block as _;
 
 /// Number of sinusoids that a wander averages.
 const SINUSOIDS: i32 = 4;
 /// Ratio of consecutive periods: the fourth root of 3. Its powers from 0 to 3 are linearly independent over the
 /// integers, so no sinusoid follows from the others and they never realign. (Powers of the golden ratio and of the
-/// plastic number are dependent.) The shortest period is two thirds of `wander.period`, the longest one and a half
+/// plastic number are dependent.) The shortest period is two thirds of `wind_variation.period`, the longest one and a half
 /// times.
 const RATIO: f64 = 1.316_074_012_952_492_5;
 /// Quantization steps of the variation of cloud cover. Each step rebakes shadows and majorants, and is too small to be
@@ -29,7 +29,7 @@ enum Quantity {
     Cover,
 }
 
-impl Wander {
+impl WindVariation {
     /// Angular velocity in rad/s, with alternating sign, and phase in radians at 0 s of each sinusoid. The wander
     /// starts `swings` periods ahead.
     fn sinusoids(&self, quantity: Quantity, swings: f64) -> impl Iterator<Item = (f64, f64)> {
@@ -69,7 +69,7 @@ impl Params {
     /// Parameters at a time in s, with the variation of the cloud cover applied.
     pub fn at(&self, time: f64) -> Self {
         let mut now = self.clone();
-        now.clouds.coverage = self.wander.cover(self.clouds.coverage, self.drift.swings, time);
+        now.clouds.coverage = self.wind_variation.cover(self.clouds.coverage, self.drift.swings, time);
         now
     }
 
@@ -85,10 +85,10 @@ impl Params {
 
     /// Whether two skies have the same winds.
     pub fn has_winds_of(&self, other: &Self) -> bool {
-        fn winds(params: &Params) -> (&Wind, &Wander, [f32; 5]) {
+        fn winds(params: &Params) -> (&Wind, &WindVariation, [f32; 5]) {
             let UpperClouds { direction, speed, .. } = params.upper_clouds;
             let HighClouds { direction: high_direction, speed: high_speed, evolution, .. } = params.high_clouds;
-            (&params.wind, &params.wander, [direction, speed, high_direction, high_speed, evolution])
+            (&params.wind, &params.wind_variation, [direction, speed, high_direction, high_speed, evolution])
         }
         winds(self) == winds(other)
     }
@@ -125,7 +125,7 @@ impl Advection {
     /// Displacements by the winds of a sky between two times in s, without its drift.
     pub fn new(params: &Params, from: f64, to: f64) -> Self {
         let (wind, upper, high) = (&params.wind, &params.upper_clouds, &params.high_clouds);
-        let (wander, swings) = (&params.wander, params.drift.swings);
+        let (wander, swings) = (&params.wind_variation, params.drift.swings);
         // Difference of each term first: a displacement from 0 s may exceed the range of f64 where the one between the
         // times does not.
         let seconds = DVec2::new(to - from, 0.0)
@@ -160,7 +160,7 @@ impl Advection {
 
     /// Drift of a sky whose displacements at a time in s, including the drift, are these.
     pub fn drift_of(&self, params: &Params, time: f64) -> Drift {
-        let swings = self.swings - time / f64::from(params.wander.period);
+        let swings = self.swings - time / f64::from(params.wind_variation.period);
         // The gusts depend on the time offset of the wander.
         let ahead = Params { drift: Drift { swings, ..Drift::default() }, ..params.clone() };
         Drift { swings, ..Drift::from(&self.plus(&Self::new(&ahead, 0.0, time), -1.0)) }
@@ -265,15 +265,15 @@ impl Between<'_> {
     /// Returns [`Error::Parameter`] if the winds wander and the span exceeds 16384 periods.
     pub fn carried(&self, swings: f64, time: f64) -> Result<Advection> {
         let [start, end] = self.span;
-        let gusty = self.skies.iter().any(|sky| sky.wander.wind > 0.0);
-        let periods =
-            (end - start) / self.skies.map(|sky| f64::from(sky.wander.period)).into_iter().fold(f64::MAX, f64::min);
+        let gusty = self.skies.iter().any(|sky| sky.wind_variation.wind > 0.0);
+        let periods = (end - start)
+            / self.skies.map(|sky| f64::from(sky.wind_variation.period)).into_iter().fold(f64::MAX, f64::min);
         if gusty && periods > MAX_PERIODS {
-            let allowed = format!("at most {MAX_PERIODS} times wander.period where winds change and wander");
+            let allowed = format!("at most {MAX_PERIODS} times wind_variation.period where winds change and wander");
             return Err(Error::parameter("keys time between two", end - start, allowed));
         }
         let sinusoids = self.skies.map(|sky| {
-            let wander = Wander { period: 1.0, ..sky.wander.clone() };
+            let wander = WindVariation { period: 1.0, ..sky.wind_variation.clone() };
             wander.sinusoids(Quantity::Wind, 0.0).collect::<Vec<_>>()
         });
         let seconds = end - start;
@@ -293,7 +293,7 @@ impl Between<'_> {
                     let turn = |&(omega, phase): &(f64, f64)| DVec2::from_angle((omega * swings + phase) % TAU);
                     let gust =
                         sinusoids[usize::from(share >= 0.5)].iter().map(turn).sum::<DVec2>() / f64::from(SINUSOIDS);
-                    let [a, b] = self.skies.map(|sky| f64::from(sky.wander.wind));
+                    let [a, b] = self.skies.map(|sky| f64::from(sky.wind_variation.wind));
                     rates = rates.with_gust(DVec2::X + (a + share * (b - a)) * gust);
                 }
                 sum = sum.plus(&rates, seconds * weight);
@@ -308,7 +308,7 @@ impl Between<'_> {
     /// at most a quarter of the wander period (140 degrees of the fastest sinusoid), and so short that the period
     /// changes by at most a quarter. No segment crosses the middle, where values that are not interpolated switch.
     fn segment_end(&self, at: f64, gusty: bool) -> f64 {
-        let [from, to] = self.skies.map(|sky| f64::from(sky.wander.period));
+        let [from, to] = self.skies.map(|sky| f64::from(sky.wind_variation.period));
         let period = from + self.second_weight(at) * (to - from);
         let seconds = if gusty { self.span[1] - self.span[0] } else { 0.0 };
         // The slope of smoothstep is up to 1.5.
@@ -343,7 +343,7 @@ impl Between<'_> {
             high: DVec2::new(line(&|sky| sky.high_clouds.speed), 0.0),
             rise: line(&|sky| sky.wind.updraft),
             evolution: line(&|sky| sky.high_clouds.evolution),
-            swings: 1.0 / line(&|sky| sky.wander.period),
+            swings: 1.0 / line(&|sky| sky.wind_variation.period),
         }
     }
 }
@@ -392,7 +392,7 @@ impl Going {
 pub(crate) fn fastest(params: &Params) -> f64 {
     let wind = &params.wind;
     let upper = if params.has_upper_clouds() { params.upper_clouds.speed.abs() } else { 0.0 };
-    let level = wind.speed.abs().max(wind.weather_speed.abs()).max(upper) * (1.0 + params.wander.wind);
+    let level = wind.speed.abs().max(wind.weather_speed.abs()).max(upper) * (1.0 + params.wind_variation.wind);
     f64::from(level.max(wind.updraft.abs()))
 }
 
@@ -413,7 +413,10 @@ mod tests {
     use crate::params::Wind;
 
     fn wandering(wind: f32, seed: u32) -> Params {
-        Params { wander: Wander { wind, coverage: 0.3, seed, ..Wander::default() }, ..Params::default() }
+        Params {
+            wind_variation: WindVariation { wind, coverage: 0.3, seed, ..WindVariation::default() },
+            ..Params::default()
+        }
     }
 
     /// Displacements by all winds, in the order of `means`.
@@ -435,7 +438,7 @@ mod tests {
     }
 
     /// Gust as a fraction of the mean velocity: the mean of rotating unit vectors, as complex numbers.
-    fn gust(wander: &Wander, time: f64) -> DVec2 {
+    fn gust(wander: &WindVariation, time: f64) -> DVec2 {
         let turn = |(omega, phase): (f64, f64)| DVec2::from_angle(omega * time + phase);
         wander.sinusoids(Quantity::Wind, 0.0).map(turn).sum::<DVec2>() / f64::from(SINUSOIDS)
     }
@@ -456,7 +459,7 @@ mod tests {
     fn displacements_are_integrals_of_velocities() {
         let params = wandering(0.7, 3);
         for time in [0.0, 1.0, 1800.0, -5000.0, 86_400.0, 2.6e6] {
-            let gust = gust(&params.wander, time);
+            let gust = gust(&params.wind_variation, time);
             let slopes = carried(&params, time - 0.5, time + 0.5);
             let whole = [carried(&params, 0.0, time - 0.5), carried(&params, 0.0, time + 0.5)];
             for (i, mean) in means(&params).into_iter().enumerate() {
@@ -476,7 +479,7 @@ mod tests {
     #[test]
     fn gusts_are_bounded_and_have_no_mean() {
         for seed in 0..20 {
-            let wander = Wander { seed, ..Wander::default() };
+            let wander = WindVariation { seed, ..WindVariation::default() };
             let times = (0..40_000).map(|i| f64::from(i) * 100.0);
             let gusts: Vec<_> = times.map(|time| gust(&wander, time)).collect();
             let count = gusts.len() as f64;
@@ -511,10 +514,10 @@ mod tests {
             assert!((a - b).abs() < 4e-4 + 0.3 / COVER_STEPS as f32);
         }
         let mut wild = params.clone();
-        wild.wander.coverage = 1.0;
+        wild.wind_variation.coverage = 1.0;
         assert!((0..1000).all(|i| (0.0..=1.0).contains(&wild.at(f64::from(i) * 500.0).clouds.coverage)));
         // Without variation the parameters stay as given.
-        wild.wander.coverage = 0.0;
+        wild.wind_variation.coverage = 0.0;
         assert_eq!(wild.at(1234.5), wild);
     }
 

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use anyhow::{Context as _, Result, bail};
-use clouds_core::params::{Params, Weather};
+use clouds_core::params::{Params, RENAMED, Weather};
 use clouds_core::schema::{Block, Map, Type, Value, assign};
 use clouds_core::{Camera, DensityGrid};
 use glam::DVec3;
@@ -93,7 +93,7 @@ fn params_from(table: Table) -> Result<Params> {
             (_, Toml::Table(fields)) => {
                 let mut blocks = params.blocks_mut();
                 let names: Vec<_> = blocks.iter().map(|(name, _)| *name).collect();
-                let Some((name, block)) = blocks.iter_mut().find(|(name, _)| *name == block) else {
+                let Some((name, block)) = blocks.iter_mut().find(|(name, _)| *name == current(&block)) else {
                     bail!("{block} is not allowed: it must be one of {}", names.join(", "));
                 };
                 fill(*block, name, &fields)?;
@@ -105,8 +105,14 @@ fn params_from(table: Table) -> Result<Params> {
     Ok(params)
 }
 
+/// Name of a block or field by its name or a deprecated one.
+fn current(name: &str) -> &str {
+    RENAMED.iter().find(|(old, _)| *old == name).map_or(name, |(_, new)| new)
+}
+
 fn fill(block: &mut dyn Block, path: &str, fields: &Table) -> Result<()> {
     for (name, given) in fields {
+        let name = current(name);
         assign(block, path, name, &value(given).with_context(|| format!("{path}.{name}"))?)?;
     }
     Ok(())
@@ -345,6 +351,13 @@ mod tests {
         params.volume = Some(Arc::new(grid.expect("is a grid")));
         let text = to_toml(&params).expect("is written");
         assert_eq!(parsed(&text).expect("is read"), params);
+    }
+
+    #[test]
+    fn deprecated_names_are_read() {
+        let params = parsed("[atmosphere]\nbeams = false\n[wander]\nwind = 0.25").unwrap();
+        assert!(!params.atmosphere.light_shafts);
+        assert!((params.wind_variation.wind - 0.25).abs() < 1e-6);
     }
 
     #[test]

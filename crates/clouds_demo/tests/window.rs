@@ -94,15 +94,15 @@ fn the_search_filters_the_fields_and_edits_change_the_sky() {
     assert!(harness.query_by_label("clouds").is_some());
     harness.get_by_role(Role::TextInput).focus();
     harness.run_steps(2);
-    harness.get_by_role(Role::TextInput).type_text("beams");
+    harness.get_by_role(Role::TextInput).type_text("light shafts");
     harness.run_steps(5);
     assert!(harness.query_by_label("clouds").is_none());
-    assert!(harness.state().params().atmosphere.beams);
-    harness.get_by_role_and_label(Role::CheckBox, "beams").scroll_to_me();
+    assert!(harness.state().params().atmosphere.light_shafts);
+    harness.get_by_role_and_label(Role::CheckBox, "light shafts").scroll_to_me();
     harness.run_steps(10);
-    harness.get_by_role_and_label(Role::CheckBox, "beams").click();
+    harness.get_by_role_and_label(Role::CheckBox, "light shafts").click();
     harness.run_steps(3);
-    assert!(!harness.state().params().atmosphere.beams);
+    assert!(!harness.state().params().atmosphere.light_shafts);
     wait_for_still(&mut harness);
 }
 

@@ -11,7 +11,7 @@ use std::sync::{Arc, Mutex};
 use clouds_core::Shot;
 use clouds_core::camera::{Camera as CoreCamera, Convention, Projection};
 use clouds_core::gpu::{self, lock};
-use clouds_core::params::{Params, Quality};
+use clouds_core::params::{Params, Quality, RENAMED};
 use clouds_core::renderer::Renderer as CoreRenderer;
 use clouds_core::scene_depth::SceneDepth;
 use clouds_core::schema::Value;
@@ -20,7 +20,7 @@ use clouds_core::{DensityGrid as CoreGrid, Error, Result, cache, color, files, p
 use glam::DVec3;
 use numpy::{PyArray1, PyArrayMethods as _, PyReadonlyArrayDyn, PyUntypedArrayMethods as _};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyString, PyTuple};
+use pyo3::types::{IntoPyDict as _, PyDict, PyString, PyTuple};
 
 use convert::{
     number_from_python, numbers_from_python, params_from_python, quality_from_python, value_from_python,
@@ -667,6 +667,12 @@ fn quality<'py>(py: Python<'py>, name: &Bound<'py, PyString>) -> PyResult<Bound<
     fields(py, &quality)
 }
 
+/// Deprecated names of fields, and their names now.
+#[pyfunction]
+fn renamed(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
+    RENAMED.into_py_dict(py)
+}
+
 /// Values of a block by name.
 fn fields<'py>(py: Python<'py>, block: &dyn schema::Block) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
@@ -807,6 +813,6 @@ mod _nubis {
     use super::{
         Camera, DensityGrid, Renderer, adapters, auto_exposure, cache_usage, carried, carried_between, check,
         check_params, check_quality, check_target, clear_cache, drift_after, drift_of, driver_settings, number,
-        quality, read_pixels, same_winds, to_srgb8, write_bytes, write_exr, write_hdr, write_png,
+        quality, read_pixels, renamed, same_winds, to_srgb8, write_bytes, write_exr, write_hdr, write_png,
     };
 }

@@ -264,7 +264,7 @@ fn composite_cells(
     let along = max(max(bend_along(above), bend_along(upper)), max(bend_along(lower), bend_along(below)));
     let across = max(bend_across(above, upper, lower), bend_across(upper, lower, below));
     let brightest = max(max(v0.x, v1.x), max(v2.x, v3.x));
-    let bends = max(along, across) > CURVATURE * params.quality.contrast * vec3f(brightest, 1.0, brightest);
+    let bends = max(along, across) > CURVATURE * params.quality.adaptive_threshold * vec3f(brightest, 1.0, brightest);
     let nearest = min(min(behind[0].w, behind[1].w), min(behind[2].w, behind[3].w));
     let farthest = max(max(behind[0].w, behind[1].w), max(behind[2].w, behind[3].w));
     // The horizon is an edge at any brightness.

@@ -238,7 +238,7 @@ struct Leaps {
 const PROFILE_SLOPE = 8.0;
 
 fn ray_leaps(direction: vec3f, medium: u32) -> Leaps {
-    var reach = params.quality.leap * frame.sky.leap_scale;
+    var reach = params.quality.sphere_tracing * frame.sky.leap_scale;
     var thickness = params.clouds.top - params.clouds.base;
     if UPPER && medium == UPPER_CLOUD {
         reach *= params.upper_clouds.scale;
@@ -247,14 +247,14 @@ fn ray_leaps(direction: vec3f, medium: u32) -> Leaps {
     return Leaps(reach, 1.0 + PROFILE_SLOPE * abs(dot(direction, frame.view.zenith)) * reach / thickness);
 }
 
-// Number of view steps from a point without cloud to the next sample. It is at least `big_step`, and grows with the
+// Number of view steps from a point without cloud to the next sample. It is at least `coarse_step`, and grows with the
 // amount by which the base shape falls short of cloud, as the slope of the noise is limited (Hart 1996, "sphere
 // tracing"; the slope used here is measured, not a bound). The threshold of cloud is evaluated for the profile at the
 // point, and for a profile of 1, which holds at any height. Longer steps never enter another medium.
 fn steps_to_next(steps: Steps, direction: vec3f, column: WeatherSample, noise: f32, at: Sample) -> u32 {
-    let big = f32(params.quality.big_step);
+    let big = f32(params.quality.coarse_step);
     if VOLUME {
-        return params.quality.big_step;
+        return params.quality.coarse_step;
     }
     let leaps = ray_leaps(direction, column.medium);
     // Distances on the chart: noise and coverage have the same slope everywhere on it.
@@ -327,7 +327,7 @@ fn march_ray(direction: vec3f, turned: Turn, limit: f32, offset: f32, within: ve
 
     var sum = Gathered();
 
-    let big = params.quality.big_step;
+    let big = params.quality.coarse_step;
     // Error on `fair_weather`: 6 % with a slack of one coarse step, 2 % with 4, and with 8 no more than for a march of
     // the whole ray. 8 take 3 % more time.
     let slack = f32(8u * big);
@@ -355,7 +355,8 @@ fn march_ray(direction: vec3f, turned: Turn, limit: f32, offset: f32, within: ve
     if i >= end {
         return Cloud(vec3f(0.0), 1.0, -1.0, NOWHERE);
     }
-    var empty = 0u; // consecutive full samples of zero density; from `empty_samples` on, the march takes coarse steps
+    // Consecutive full samples of zero density; from `empty_before_coarse` on, the march takes coarse steps.
+    var empty = 0u;
     var reached = 0.0; // sum of distances by weight, m
     var group = Group();
     var groups: array<Group, GROUPS>;
@@ -371,7 +372,7 @@ fn march_ray(direction: vec3f, turned: Turn, limit: f32, offset: f32, within: ve
             let noise = base_noise(column);
             let shape = shape_in(column, noise);
             // Outside clouds samples are coarse. On a hit the march goes back over the skipped steps.
-            let searching = empty >= params.quality.empty_samples;
+            let searching = empty >= params.quality.empty_before_coarse;
             let hit = !(shape <= 0.0); // not "shape > 0", with which a NaN would never advance
             let back = select(i, max(i - min(i, leapt - 1u), seen), searching);
             let full = hit && back == i;
@@ -394,7 +395,7 @@ fn march_ray(direction: vec3f, turned: Turn, limit: f32, offset: f32, within: ve
                 i = select(i, end, transmittance < params.quality.min_transmittance);
             }
             let of_rain = select(1.0, RAIN_SHARE, RAIN_SHAFTS && column.medium == RAIN);
-            let share = rays * params.quality.light_share * of_rain;
+            let share = rays * params.quality.light_group_weight * of_rain;
             if group.weight > select(share, 0.0, i >= end) {
                 groups[count] = group;
                 count += 1u;

@@ -113,7 +113,7 @@ fn resolve(pixel: vec2u, around: Bounds, between: RaySample) {
     // ray are marched over their full length.
     let open = min(around.scene, scene_at(pixel)) >= NO_SCENE;
     cloud_span[index] = select(vec2f(0.0, 1e30), around.span, open);
-    if contrast(around.light, around.transmittance) > params.quality.contrast || !open {
+    if contrast(around.light, around.transmittance) > params.quality.adaptive_threshold || !open {
         active_rays[atomicAdd(&ray_count, 1u)] = index;
     } else {
         let distance = between.distance;

@@ -21,15 +21,15 @@ override STRIDE: i32 = 4;
 override CYCLE: u32 = u32(STRIDE * STRIDE);
 
 // Bounds on the tolerance: the contrast between a ray and its prediction up to which the history around is reprojected.
-// Within the bounds it is the threshold of adaptive sampling (`quality.contrast`). Error against a picture of rays
-// alone and fraction of pixels marched, measured in flights of five scenes at 480x270: with 0.2 5.6 % and 0.099, with
-// 0.4 6.4 % and 0.075, with 0.7 7.7 % and 0.066, without a bound 15.5 % and 0.063.
+// Within the bounds it is the threshold of adaptive sampling (`quality.adaptive_threshold`). Error against a picture of
+// rays alone and fraction of pixels marched, measured in flights of five scenes at 480x270: with 0.2 5.6 % and 0.099,
+// with 0.4 6.4 % and 0.075, with 0.7 7.7 % and 0.066, without a bound 15.5 % and 0.063.
 const LEAST_TOLERANCE = 0.1;
 const MOST_TOLERANCE = 0.4;
 
 // Contrast between the rays around a pixel without history up to which the pixel is interpolated, relative to
-// `quality.contrast`. The rays are as far apart as samples of the initial grid of a still, which is refined further. In
-// a flight of `fair_weather` the error is 5.9 % with 0.5 and 6.8 % with 1.
+// `quality.adaptive_threshold`. The rays are as far apart as samples of the initial grid of a still, which is refined
+// further. In a flight of `fair_weather` the error is 5.9 % with 0.5 and 6.8 % with 1.
 const INTERPOLATION_SHARE = 0.5;
 
 // Maximum width of a cell for these thresholds, radians: half a degree, within which no clouds are lost between rays
@@ -286,7 +286,7 @@ fn read_cell(at: vec2i) -> Cell {
 
 // Maximum contrast between ray and prediction for reprojection.
 fn tolerance(past: CellPast) -> f32 {
-    return clamp(params.quality.contrast, LEAST_TOLERANCE, MOST_TOLERANCE) * narrowness(past);
+    return clamp(params.quality.adaptive_threshold, LEAST_TOLERANCE, MOST_TOLERANCE) * narrowness(past);
 }
 
 fn narrowness(past: CellPast) -> f32 {
@@ -436,7 +436,7 @@ fn fill(cell: Cell, place: vec2i, old: vec4f, alone: bool) {
     let depth = history_depth[pixel_index(shifted)];
     let error = select(quarter(cell.error, place), quarter(cell.own_error, place), length == CYCLE);
     let contrast = quarter(cell.contrast, place);
-    let least = INTERPOLATION_SHARE * params.quality.contrast * narrowness(cell.past);
+    let least = INTERPOLATION_SHARE * params.quality.adaptive_threshold * narrowness(cell.past);
     let alike = contrast <= least;
     let ghost = alike && error > max(GHOST * contrast, LEAST_GHOST);
     let seen = was_known(shifted) && is_finite4(old);

@@ -69,7 +69,9 @@ fn corners(size: [u32; 2]) -> [u32; 2] {
 /// wider than its largest spacing of samples. The high clouds must be a single layer, which they are from below.
 pub(crate) fn by_cells(frame: &Frame, quality: &Quality) -> bool {
     let single = !frame.high_clouds || frame.view.power_high <= 0.0;
-    quality.contrast > 0.0 && single && TILE as f32 * frame.marched_angle() / frame.dispatch.stride as f32 <= WIDEST
+    quality.adaptive_threshold > 0.0
+        && single
+        && TILE as f32 * frame.marched_angle() / frame.dispatch.stride as f32 <= WIDEST
 }
 
 /// Composites the strip of `frame`. With `by_cells` smooth cells are interpolated, and the pixels of the others are

@@ -13,12 +13,12 @@ use crate::params::{Integrator, Quality};
 /// Whether only the initial grid is marched: at a threshold of 1, without a user's scene, which may have edges. The
 /// composite pass upsamples it cell by cell (composite.wgsl).
 pub(crate) fn is_low_resolution(frame: &Frame, quality: &Quality) -> bool {
-    quality.contrast >= 1.0 && !frame.scene && coarsest(frame, quality) == TILE
+    quality.adaptive_threshold >= 1.0 && !frame.scene && coarsest(frame, quality) == TILE
 }
 
 impl Quality {
     /// Whether a picture of `size` pixels is rendered at low resolution: only one pixel in sixteen is marched, and
-    /// reprojected in an animation. The conditions are a `contrast` of 1 and pixels narrower than an eighth of a
+    /// reprojected in an animation. The conditions are a `adaptive_threshold` of 1 and pixels narrower than an eighth of a
     /// degree. Pictures with a user's scene are always rendered at full resolution.
     pub fn is_low_resolution(&self, camera: &Camera, size: [u32; 2]) -> bool {
         self.integrator == Integrator::March && is_low_resolution(&Frame::seen_by(camera, size), self)
@@ -78,7 +78,7 @@ pub(crate) fn is_needed(frame: &Frame, quality: &Quality) -> bool {
 
 /// Spacing of the initial grid in samples. At 1 every sample is marched.
 pub(crate) fn coarsest(frame: &Frame, quality: &Quality) -> u32 {
-    let fits = |n: &u32| quality.contrast > 0.0 && *n as f32 * frame.marched_angle() <= WIDEST;
+    let fits = |n: &u32| quality.adaptive_threshold > 0.0 && *n as f32 * frame.marched_angle() <= WIDEST;
     [TILE, 2].into_iter().find(fits).unwrap_or(1)
 }
 

@@ -89,13 +89,13 @@ window: setup
 # Two processes: most of the time Mesa compiles kernels, which it does on one thread.
 PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 
-test: types window ## Run the tests of the first tier (8 min on two cores); needs no GPU
+test: types window ## Run the tests of the first tier (4 min on two cores, 6 more for the first build); needs no GPU
 	cargo test --release
 	cargo test --release -p clouds_demo
 	$(PYTEST) -m 'not slow'
 
 # The window by itself: a click is 0.3 s long, and what it hits depends on when the window sees it.
-test-slow: build window ## Run those of the second: what takes long for what it guards
+test-slow: build window ## Run those of the second, which take long for what they guard (15 min on two cores)
 	cargo test --release -p clouds_demo -- --ignored
 	$(PYTEST) -m slow --ignore tests/test_demo.py
 	$(BIN)/python -m pytest -m slow tests/test_demo.py

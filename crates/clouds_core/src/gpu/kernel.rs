@@ -382,12 +382,17 @@ impl Gpu {
     fn program(&self, pass: &'static str, imports: &[Import]) -> Result<Arc<Program>> {
         let kernels = self.common::<Kernels>();
         let same = |program: &&Arc<Program>| program.imports.iter().all(|import| imports.contains(import));
-        let linked = lock(&kernels.programs).get(pass).and_then(|programs| programs.iter().find(same).cloned());
-        if let Some(program) = linked {
-            return Ok(program);
+        if let Some(program) = lock(&kernels.programs).entry(pass).or_default().iter().find(same) {
+            return Ok(program.clone());
         }
         let program = Arc::new(Program::new(self, pass, imports)?);
-        lock(&kernels.programs).entry(pass).or_default().push(program.clone());
+        let mut programs = lock(&kernels.programs);
+        let programs = programs.entry(pass).or_default();
+        // Another thread may have linked it meanwhile.
+        if let Some(other) = programs.iter().find(same) {
+            return Ok(other.clone());
+        }
+        programs.push(program.clone());
         Ok(program)
     }
 

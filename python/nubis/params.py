@@ -469,11 +469,13 @@ class Light(Block):
 
     Attributes
     ----------
-    model : {single, nubis2015, thesis2018, vsu2022, octaves, path}
+    model : {single, nubis2015, thesis2018, vsu2022, octaves, multiple, path}
         Light model. `single` is physical single scattering. `nubis2015`, `thesis2018` and `vsu2022`
         are the published models. `octaves` approximates multiple scattering (Wrenninge et al. 2013,
-        Hillaire 2016). `path` traces paths of every order of scattering and is the reference of the
-        others. Allowed: one of "single", "nubis2015", "thesis2018", "vsu2022", "octaves", "path".
+        Hillaire 2016). `multiple` has every order of scattering, from a light field that is solved
+        for the clouds. `path` traces paths of every order of scattering and is the reference of the
+        others. Allowed: one of "single", "nubis2015", "thesis2018", "vsu2022", "octaves",
+        "multiple", "path".
     phase : {henyey_greenstein, droplet, mie}
         Phase function. `henyey_greenstein` has the parameter `g` (in thesis2018 and vsu2022
         `g_back`, too), as published. `droplet` is a fit to cloud droplets, which gives clouds a
@@ -536,7 +538,9 @@ class Light(Block):
         Allowed: a number from 1 to 100.
     """
 
-    model: Literal["single", "nubis2015", "thesis2018", "vsu2022", "octaves", "path"] = "octaves"
+    model: Literal[
+        "single", "nubis2015", "thesis2018", "vsu2022", "octaves", "multiple", "path"
+    ] = "octaves"
     phase: Literal["henyey_greenstein", "droplet", "mie"] = "henyey_greenstein"
     droplet_diameter: float = 20.0
     g: float = 0.6
@@ -643,6 +647,14 @@ class Quality(Block):
     light_distance : float
         Reach of the light samples; 0 extends them to the end of the clouds. Allowed: a number from
         0 to 100000 m.
+    field_cells : int
+        Cells of a level of the light field across (light model `multiple`). Allowed: a whole number
+        from 16 to 128.
+    field_cell : float
+        Cell of the finest level of the light field. Allowed: a number from 10 to 10000 m.
+    relief_samples : int
+        Number of density samples toward the sun, near the view sample, before the light field is
+        read: relief finer than its cells. Allowed: a whole number from 0 to 64.
     far_sample : bool
         Whether a further light sample is taken at three times the reach of the others, for shadows
         of distant clouds (nubis2015). Allowed: True or False.
@@ -695,6 +707,9 @@ class Quality(Block):
     light_steps: int = 16
     light_group_weight: float = 0.15
     light_distance: float = 0.0
+    field_cells: int = 64
+    field_cell: float = 100.0
+    relief_samples: int = 2
     far_sample: bool = False
     cone: float = 0.0
     light_detail_cutoff: float = 1.0

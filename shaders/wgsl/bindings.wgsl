@@ -74,6 +74,31 @@ override LIGHT_CHEAP: bool = true; // light samples without detail noise
 // sky_scale (passes/light_shafts).
 @group(0) @binding(51) var light_shafts: texture_3d<f32>;
 
+// Light field (light_field.wgsl), levels stacked along the third axis: density (r) and optical depth toward the sun (g);
+// fluence (r) and flux of the sun's light and of the sky's. Forward chains of scattering by angle and optical depth.
+@group(0) @binding(81) var field_optics: texture_3d<f32>;
+@group(0) @binding(82) var field_sun: texture_3d<f32>;
+@group(0) @binding(83) var field_sky: texture_3d<f32>;
+@group(0) @binding(84) var forward_table: texture_2d<f32>;
+
+// Level of the light field while it is solved (passes/light_field). Cells are stored row by row.
+@group(0) @binding(85) var<uniform> level: FieldLevel;
+@group(0) @binding(86) var level_optics: texture_3d<f32>; // as `field_optics`, and the largest density (b)
+@group(0) @binding(87) var coarser_optics: texture_3d<f32>;
+// Fluence and flux: of the sun's light, then of the sky's.
+@group(0) @binding(88) var<storage, read_write> moments_now: array<vec4f>;
+@group(0) @binding(89) var<storage, read_write> moments_before: array<vec4f>;
+@group(0) @binding(90) var<storage, read_write> coarser_moments: array<vec4f>;
+@group(0) @binding(91) var<storage, read_write> sources: array<vec4f>; // of sun and sky
+@group(0) @binding(92) var<storage, read_write> deposits: array<vec2f>; // scaled extinction, 1/m; scaled sunlight
+// Radiance by direction, of sun and sky: mean in each cell, the same of the coarser level, and what enters at the sides.
+@group(0) @binding(93) var<storage, read_write> radiances: array<vec2f>;
+@group(0) @binding(94) var<storage, read_write> coarser_radiances: array<vec2f>;
+@group(0) @binding(95) var<storage, read_write> entering: array<vec2f>;
+@group(0) @binding(96) var<storage, read_write> balance: array<vec4f>; // factor on the sunlight of all cells
+@group(0) @binding(97) var sun_out: texture_storage_3d<rgba16float, write>;
+@group(0) @binding(98) var sky_out: texture_storage_3d<rgba16float, write>;
+
 // Buffers with an entry for each pixel, row by row. Those of the clouds have an entry for each sample of the sample
 // grid (sample_grid.wgsl).
 @group(0) @binding(12) var<storage, read_write> clouds: array<vec4f>; // premultiplied radiance, transmittance
@@ -147,6 +172,7 @@ struct ReferenceRay {
     // Sums of the scattering (`Gathered`).
     sun: vec4f,
     above: vec4f,
+    below: vec4f,
     weight: vec4f,
     stage: u32,
     level: u32, // number of halvings of the panels

@@ -109,7 +109,11 @@ fn cloud_column(p: vec3f, altitude: f32) -> WeatherSample {
         let thickness = frame.sky.volume_high.z - frame.sky.volume_low.z;
         return WeatherSample(select(0.0, 1.0, in_volume(p)), 1.0, 1.0, height, 0.0, p, CLOUD, thickness, height);
     }
-    let place = on_chart(p, altitude);
+    return column_on_chart(on_chart(p, altitude), altitude);
+}
+
+// Weather at a point of the chart, relative to the eye.
+fn column_on_chart(place: vec2f, altitude: f32) -> WeatherSample {
     let at = sheared(place, altitude);
     let broad = large_scale_weather(at);
     var weather = weather_from_map(weather_texel(frame.sky.weather_origin, at, broad));

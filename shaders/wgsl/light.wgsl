@@ -1,5 +1,6 @@
 // Radiance that clouds scatter toward the eye from sunlight and skylight. `light_model` stands for the file of the
-// light model in light_models/, which has `lobe_phase`, `seen_scattering`, `slowest_extinction` and `AMBIENT`.
+// light model in light_models/, which has `lobe_phase`, `seen_scattering`, `slowest_extinction` and `AMBIENT`, and the
+// functions of marched_light.wgsl, or imports them.
 #import math
 #import phase
 #import droplets
@@ -191,23 +192,47 @@ fn is_sunlit() -> bool {
     return any(sky_light[2].rgb > vec3f(0.0));
 }
 
+// Consecutive samples of a ray that are lit together.
+struct Span {
+    start: f32, // optical depth in front of it
+    thick: f32, // its optical depth
+    weight: f32, // sum of `sample_weight`
+    depth_to_sun: f32, // optical depth toward the sun
+    precipitation: f32,
+    above: f32, // `sky_share`
+    distance: f32, // m from the eye
+    is_last: bool, // whether it stands for all behind it
+}
+
+// Light that a span scatters toward the eye, relative to its weight.
+struct Lit {
+    weight: f32,
+    sun: f32, // of the sun, for an irradiance of 1
+    above: f32, // of a sky of radiance 1
+    below: f32, // of a ground of radiance 1
+    distance: f32,
+}
+
 // Scattering accumulated along a ray. The sums are scalars, distributed over the four distances of `AerialPoints` by
 // interpolation weights; colours are computed once, at the end. Without air all weight is at the first distance.
 struct Gathered {
-    sun: vec4f, // weighted sum of `sun_scattering`
-    above: vec4f, // weighted sum of the ambient light's share from above
-    weight: vec4f, // sum of the samples' weights: in total 1 minus the transmittance
+    sun: vec4f, // sums of `Lit` times weights
+    above: vec4f,
+    below: vec4f,
+    weight: vec4f, // sum of the weights: in total 1 minus the transmittance
 }
 
-fn gather(sum: Gathered, nodes: AerialPoints, weight: f32, sun: f32, above: f32, distance: f32) -> Gathered {
+fn gather(sum: Gathered, nodes: AerialPoints, lit: Lit) -> Gathered {
     if AIR {
-        let w = weight * aerial_point_shares(nodes, distance);
-        return Gathered(sum.sun + w * sun, sum.above + w * above, sum.weight + w);
+        let w = lit.weight * aerial_point_shares(nodes, lit.distance);
+        return Gathered(sum.sun + w * lit.sun, sum.above + w * lit.above, sum.below + w * lit.below, sum.weight + w);
     }
+    let w = lit.weight;
     return Gathered(
-        vec4f(sum.sun.x + weight * sun, 0.0, 0.0, 0.0),
-        vec4f(sum.above.x + weight * above, 0.0, 0.0, 0.0),
-        vec4f(sum.weight.x + weight, 0.0, 0.0, 0.0),
+        vec4f(sum.sun.x + w * lit.sun, 0.0, 0.0, 0.0),
+        vec4f(sum.above.x + w * lit.above, 0.0, 0.0, 0.0),
+        vec4f(sum.below.x + w * lit.below, 0.0, 0.0, 0.0),
+        vec4f(sum.weight.x + w, 0.0, 0.0, 0.0),
     );
 }
 
@@ -228,9 +253,7 @@ fn gathered_radiance(sum: Gathered, nodes: AerialPoints, direction: vec3f) -> ve
     if !AMBIENT {
         return sun;
     }
-    let below = sum.weight.x - sum.above.x;
-    let ground = ground_share() * sky_light[1].rgb;
-    return sun + sum.above.x * ambient_above(vec3f(0.0)) + below * ambient_below(ground);
+    return sun + ambient_light(sum.above.x, sum.below.x, vec3f(0.0), sky_light[1].rgb);
 }
 
 fn radiance_through_air(sum: Gathered, nodes: AerialPoints, direction: vec3f) -> vec3f {
@@ -250,8 +273,7 @@ fn radiance_through_air(sum: Gathered, nodes: AerialPoints, direction: vec3f) ->
         let mu = cos_zenith_at(p, frame.sky.sun_direction);
         var light = sum.sun[k] * sun_irradiance(h, mu);
         if AMBIENT {
-            light += sum.above[k] * ambient_above(clouded_sky(light_from_above(h, mu)));
-            light += (sum.weight[k] - sum.above[k]) * ambient_below(ground_share() * light_from_below(h, mu));
+            light += ambient_light(sum.above[k], sum.below[k], light_from_above(h, mu), light_from_below(h, mu));
         }
         radiance += air.transmittance * light + sum.weight[k] * air.radiance;
     }

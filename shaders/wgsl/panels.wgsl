@@ -3,7 +3,6 @@
 #import bindings
 #import shell
 #import density
-#import ambient
 
 // Position of the first Gauss point in a panel, and of the second from its end: (1 - 1 / sqrt 3) / 2.
 const GAUSS = 0.21132486540518713;
@@ -17,8 +16,8 @@ struct Panel {
 // Values of the field at the two points.
 struct Reading {
     density: vec2f,
-    share: vec2f, // fraction of the ambient light from above
-    precipitation: vec2f,
+    first: WeatherSample,
+    second: WeatherSample,
 }
 
 // Panel that starts `x` metres into the segments of a ray: at most `longest`, within one segment and one cell of the
@@ -53,8 +52,8 @@ fn read_panel(panel: Panel, origin: vec3f, direction: vec3f, s: Segments, width:
     let b = cloud_column(q, altitude_at(q));
     return Reading(
         vec2f(cloud_density(a, cloud_shape(a), width), cloud_density(b, cloud_shape(b), width)),
-        vec2f(ambient_share(a), ambient_share(b)),
-        vec2f(a.precipitation, b.precipitation),
+        a,
+        b,
     );
 }
 

@@ -9,11 +9,13 @@ use glam::{DVec2, DVec3, Vec3};
 use crate::camera::{Camera, Projection};
 use crate::clipmap;
 use crate::directions::{compass, sun_direction};
+use crate::field::{self, FieldShape};
 use crate::gpu::{Binding, Gpu};
 use crate::grid::SampleGrid;
 use crate::moon::MOON_RADIUS;
 use crate::params;
-use crate::params::{Edge, Model, Params, Phase};
+use crate::params::{Edge, Model, Params, Phase, Quality};
+use crate::scattering::{Split, droplet};
 use crate::shared::constants;
 use crate::uniforms::{Dispatch, Sky, View, uniform};
 use crate::wind::Advection;
@@ -92,17 +94,6 @@ const MAX_GLOW_WIDTH: f32 = 0.032;
 /// Maximum number of directions per axis over which the sky and the phase function are averaged in a pixel.
 const MAX_SKY_SAMPLES: f32 = 12.0;
 const MAX_PHASE_SAMPLES: f32 = 64.0;
-
-/// Fit to the phase function of droplets of 5 to 50 µm diameter: g of the Henyey-Greenstein lobe, g and alpha of the
-/// Draine lobe, weight of the Draine lobe (Jendersie and d'Eon 2023, equations 4 to 7).
-fn droplet(diameter: f64) -> [f64; 4] {
-    [
-        (-0.099_056_7 / (diameter - 1.671_54)).exp(),
-        (-2.206_79 / (diameter + 3.910_29) - 0.428_934).exp(),
-        (3.624_89 - 8.292_88 / (diameter + 5.528_25)).exp(),
-        (-0.599_085 / (diameter - 0.641_583) - 0.665_888).exp(),
-    ]
-}
 
 /// Half width in radians of the narrowest peak of the phase function of clouds.
 fn phase_width(params: &Params) -> f32 {
@@ -201,6 +192,7 @@ impl Frame {
         frame.sky.sun_direction = sun_direction(params).as_vec3().to_array();
         frame.set_high_sun(params);
         frame.sky.droplet = droplet(f64::from(params.light.droplet_diameter)).map(|v| v as f32);
+        frame.set_split(params);
         frame.set_sky_scale(params);
         frame.view.sun_bounds = frame.disc_bounds(camera, sun_direction(params), SUN_RADIUS);
         frame.set_moon(camera, params);
@@ -591,6 +583,49 @@ impl Frame {
             numbers[octave % 4] = number;
             ages[octave % 4] = age;
         }
+    }
+
+    /// Sets the split of the phase function that the light field is solved with.
+    fn set_split(&mut self, params: &Params) {
+        if params.light.model == Model::Multiple {
+            let split = Split::new(&params.light);
+            let source = split.albedo / (4.0 * PI64);
+            self.sky.split = [split.forward, split.mean_cosine, split.scale, source].map(|v| v as f32);
+            self.sky.turned_cosine = split.turned_cosine as f32;
+        }
+    }
+
+    /// Sets shape, position and axes of the light field.
+    pub(crate) fn set_field(&mut self, eye: DVec3, params: &Params, time: f64, quality: &Quality) {
+        if !field::is_read(params) {
+            return;
+        }
+        let shape = FieldShape::new(params, quality, self.view.altitude);
+        let [across, along, rows] = shape.cells.map(|n| n as f32);
+        self.sky.field_size = [across, along, rows, shape.levels as f32];
+        self.sky.field_cell = shape.cell;
+        self.sky.field_halvings = shape.halvings;
+        if params.volume.is_some() {
+            return;
+        }
+        let origin = field::origin(eye, params, time);
+        let drift = Advection::new(params, origin.time, time).drift().truncate();
+        let centre = on_chart(origin.place.extend(0.0), params);
+        self.sky.field_eye = (on_chart(eye, params) - centre - drift).as_vec2().to_array();
+        // The chart is conformal: the image of a horizontal step is that step, turned and scaled.
+        let zenith = Vec3::from_array(self.view.zenith).as_dvec3();
+        let (a, b) = zenith.any_orthonormal_pair();
+        let image = |step: DVec3| on_chart(eye + step, params) - on_chart(eye - step, params);
+        let (of_a, of_b) = (image(a), image(b));
+        let axis = |x: f64, y: f64| (x * a + y * b).try_normalize().unwrap_or(a).as_vec3().to_array();
+        self.sky.field_east = axis(of_a.x, of_b.x);
+        self.sky.field_north = axis(of_a.y, of_b.y);
+    }
+
+    /// Components of a direction at the eye along the axes of the light field: east, north and up.
+    pub(crate) fn in_field(&self, direction: Vec3) -> Vec3 {
+        let axes = [self.sky.field_east, self.sky.field_north, self.view.zenith].map(Vec3::from_array);
+        Vec3::from_array(axes.map(|axis| axis.dot(direction)))
     }
 
     /// Sets the camera and the sun of the previous frame and the displacements since in m, for reprojection.

@@ -70,6 +70,8 @@ choice! {
         /// Approximation of multiple scattering: a sum of octaves of single scattering, each with less extinction and
         /// less anisotropy than the one before (Wrenninge et al. 2013, Hillaire 2016), plus ambient light.
         Octaves = "octaves",
+        /// Every order of scattering, from a light field that is solved on nested levels of cells.
+        Multiple = "multiple",
         /// Path tracing of every order of scattering: slow and noisy. It is the reference of the other models.
         Path = "path",
     }
@@ -357,6 +359,7 @@ params! {
     Light {
         /// Light model. `single` is physical single scattering. `nubis2015`, `thesis2018` and `vsu2022` are the
         /// published models. `octaves` approximates multiple scattering (Wrenninge et al. 2013, Hillaire 2016).
+        /// `multiple` has every order of scattering, from a light field that is solved for the clouds.
         /// `path` traces paths of every order of scattering and is the reference of the others.
         model: Model = Model::Octaves;
         /// Phase function. `henyey_greenstein` has the parameter `g` (in thesis2018 and vsu2022 `g_back`, too), as
@@ -460,6 +463,13 @@ params! {
         light_group_weight: f32 = 0.15, in 0..=1 "";
         /// Reach of the light samples; 0 extends them to the end of the clouds.
         light_distance: f32 = 0.0, in 0..=100000 "m";
+        /// Cells of a level of the light field across (light model `multiple`).
+        field_cells: u32 = 64, in 16..=128 "";
+        /// Cell of the finest level of the light field.
+        field_cell: f32 = 100.0, in 10..=10000 "m";
+        /// Number of density samples toward the sun, near the view sample, before the light field is read: relief finer
+        /// than its cells.
+        relief_samples: u32 = 2, in 0..=64 "";
         /// Whether a further light sample is taken at three times the reach of the others, for shadows of distant
         /// clouds (nubis2015).
         far_sample: bool = false;

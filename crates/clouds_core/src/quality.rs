@@ -68,10 +68,10 @@ impl Quality {
     /// Checks that the integrator has the light model of a sky.
     pub(crate) fn check_model(&self, params: &Params) -> Result<()> {
         let model = params.light.model;
-        if self.integrator != Integrator::Path || matches!(model, Model::Octaves | Model::Path) {
+        if self.integrator != Integrator::Path || matches!(model, Model::Octaves | Model::Multiple | Model::Path) {
             return Ok(());
         }
-        let allowed = "'octaves' with quality.integrator = 'path', which traces every order of scattering";
+        let allowed = "'multiple' or 'octaves' with quality.integrator = 'path', which traces every order of scattering";
         Err(Error::parameter("light.model", model.to_value(), allowed))
     }
 

@@ -5,11 +5,11 @@ use std::sync::Arc;
 
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
-use crate::luts::{large_scale_weather, majorant, multiscatter, noise, shadow, sky, weather};
+use crate::luts::{large_scale_weather, light_field, majorant, multiscatter, noise, shadow, sky, weather};
 use crate::params::{self, Model, Params, Quality};
 use crate::schema::{Block, wgsl_struct};
-use crate::uniforms::{Dispatch, Sky, View};
-use crate::{blue_noise, camera, color, frame, gpu, grid, moon, scene_depth, specialization};
+use crate::uniforms::{Dispatch, FieldLevel, Sky, View};
+use crate::{blue_noise, camera, color, frame, gpu, grid, moon, scattering, scene_depth, specialization};
 
 pub use crate::gpu::{Linked, names};
 
@@ -54,7 +54,8 @@ fn generated(name: &str) -> Option<String> {
     match name {
         "params" => Some(params_source()),
         "uniforms" => {
-            let parts: [&dyn Block; 3] = [&View::default(), &Sky::default(), &Dispatch::default()];
+            let parts: [&dyn Block; 4] =
+                [&View::default(), &Sky::default(), &Dispatch::default(), &FieldLevel::default()];
             let frame = "struct Frame {\n    @align(16) view: View,\n    @align(16) sky: Sky,\n}\n";
             Some(parts.map(wgsl_struct).concat() + frame)
         }
@@ -86,6 +87,7 @@ fn constants_source() -> String {
         color::constants,
         frame::constants,
         grid::constants,
+        light_field::constants,
         gpu::device_constants,
         majorant::constants,
         moon::constants,
@@ -93,6 +95,7 @@ fn constants_source() -> String {
         noise::constants,
         params::constants,
         gpu::recorder_constants,
+        scattering::constants,
         scene_depth::constants,
         shadow::constants,
         sky::constants,

@@ -57,6 +57,7 @@ impl<'a> Shot<'a> {
         let params = self.params.at(self.time);
         let mut frame = Frame::new(self.camera, &params, self.time, size);
         frame.view.most_rays = quality.most_rays();
+        frame.set_field(self.camera.eye, &params, self.time, quality);
         frame.view.background = u32::from(self.background);
         frame.scene = self.scene.is_some();
         frame.view.scene_lit = u32::from(self.scene.is_some_and(|scene| scene.color.is_some()));

@@ -44,6 +44,7 @@ pub(crate) fn of_bakes() -> Arc<Specialization> {
 pub(crate) fn light_model(model: Model) -> Import {
     let file = match model {
         Model::Single => "light_models/single",
+        Model::Multiple => "light_models/multiple",
         Model::Octaves | Model::Path => "light_models/octaves",
         Model::Nubis2015 => "light_models/nubis2015",
         Model::Thesis2018 => "light_models/thesis2018",

@@ -132,6 +132,23 @@ crate::params! {
         /// Fit to the phase function of cloud droplets (droplets.wgsl): g of the Henyey-Greenstein lobe, g and alpha of
         /// the Draine lobe, weight of the Draine lobe.
         droplet: [f32; 4] = [0.0; 4];
+        /// Split of the phase function (light_field.wgsl): fraction of the light that keeps going, mean cosine, scale of
+        /// the extinction, scaled albedo over 4 pi.
+        split: [f32; 4] = [0.0, 0.0, 1.0, 0.0];
+        /// Mean cosine of the light that turns.
+        turned_cosine: f32 = 0.0;
+        /// Cells of the finest level of the light field: across, along, rows; number of levels.
+        field_size: [f32; 4] = [1.0; 4];
+        /// Cell of the finest level, m.
+        field_cell: [f32; 3] = [1.0; 3];
+        /// Number of levels beyond the finest whose rows are twice as high as those of the level before.
+        field_halvings: u32 = 0;
+        /// Position of the eye relative to the middle of the light field, after advection, on the chart, m.
+        field_eye: [f32; 2] = [0.0; 2];
+        /// Axes of the light field at the eye, in the world: east and north on the chart.
+        field_east: [f32; 3] = [1.0, 0.0, 0.0];
+        /// As `field_east`.
+        field_north: [f32; 3] = [0.0, 1.0, 0.0];
         /// Factor on the texels of the sky-view LUT (atmosphere.wgsl).
         sky_scale: f32 = 1024.0;
         /// Irradiance that the texels of the sky-view LUT are divided by.
@@ -241,6 +258,44 @@ crate::params! {
         first_ray: u32 = 0;
         /// Maximum number of loop iterations of each ray in this dispatch.
         budget: u32 = 0;
+    }
+}
+
+crate::params! {
+    /// Level of the light field while it is baked (passes/light_field).
+    FieldLevel {
+        /// Cells toward the east.
+        across: u32 = 1;
+        /// Cells toward the north.
+        along: u32 = 1;
+        /// Cells upward.
+        rows: u32 = 1;
+        /// Light that enters at the sides (luts/light_field.rs).
+        sides: u32 = 0;
+        /// Cell, m.
+        cell: [f32; 3] = [1.0; 3];
+        /// Cells of the coarser level, 0 if there is none.
+        coarser_across: u32 = 0;
+        /// As `coarser_across`.
+        coarser_along: u32 = 0;
+        /// As `coarser_across`.
+        coarser_rows: u32 = 0;
+        /// Cells of the coarser level per cell.
+        coarser_scale: [f32; 3] = [1.0; 3];
+        /// First row in the textures of all levels.
+        first_row: u32 = 0;
+        /// Unit vector toward the sun, in the axes of the field.
+        sun: [f32; 3] = [0.0, 0.0, 1.0];
+        /// Whether the sun reaches the clouds.
+        sunlit: u32 = 0;
+        /// Curvature of the ground, half of the reciprocal of its radius, 1/m.
+        bend: f32 = 0.0;
+        /// Largest number of cells that a ray toward the sun crosses in this level.
+        sun_steps: u32 = 1;
+        /// Factor on the change by a sweep.
+        relaxation: f32 = 1.0;
+        /// Weight of a step of Chebyshev's iteration.
+        weight: f32 = 1.0;
     }
 }
 

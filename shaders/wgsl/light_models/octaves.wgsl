@@ -2,6 +2,7 @@
 // less anisotropy (Wrenninge et al. 2013, Hillaire 2016). The high clouds have no thickness and use it with the path
 // tracer, too.
 #import bindings
+#import marched_light
 #import droplets
 
 const AMBIENT = true;

@@ -1,5 +1,6 @@
 // Light model `single`: physical single scattering with the phase function of the droplets.
 #import bindings
+#import marched_light
 #import droplets
 
 // Whether skylight is added.

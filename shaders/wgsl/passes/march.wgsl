@@ -183,24 +183,30 @@ fn march_sample(s: Segments, steps: Steps, direction: vec3f, offset: f32, i: u32
     return Sample(p, t, altitude_at(p), begin, length, max(t * pixel_size, 0.3 * length));
 }
 
-// Light group: consecutive samples that share their light samples.
+// Adds a sample to a light group: consecutive samples that share their light samples. The group's distance is the mean by
+// weight, or that of the sample if it outweighs all before it: otherwise a veil in front of a cloud would move the group
+// into the gap between them.
 struct Group {
-    weight: f32, // sum of the samples' weights: the decrease of the transmittance
-    distance: f32, // mean by weight, m from the eye
-    precipitation: f32, // mean by weight
-    above: f32, // share of the ambient light from above, mean by weight
+    span: Span,
     width: f32, // footprint of the last sample, m
     opacity: f32, // opacity in front of the last sample
 }
 
-// Adds a sample to a group. The group's distance is the mean by weight, or that of the sample if it outweighs all
-// before it: otherwise a veil in front of a cloud would move the group into the gap between them.
-fn with_sample(group: Group, weight: f32, opacity: f32, at: Sample, column: WeatherSample) -> Group {
-    let here = vec3f(at.t, column.precipitation, ambient_share(column));
-    let before = vec3f(group.distance, group.precipitation, group.above);
-    let total = group.weight + weight;
-    let mean = select(mix(before, here, weight / total), here, weight > group.weight);
-    return Group(total, mean.x, mean.y, mean.z, at.width, opacity);
+fn with_sample(given: Group, weight: f32, depth: f32, x: f32, opacity: f32, at: Sample, column: WeatherSample) -> Group {
+    var group = given;
+    let here = vec3f(at.t, column.precipitation, sky_share(column));
+    let before = vec3f(group.span.distance, group.span.precipitation, group.span.above);
+    let total = group.span.weight + weight;
+    let mean = select(mix(before, here, weight / total), here, weight > group.span.weight);
+    group.span.start = select(group.span.start, depth, group.span.weight <= 0.0);
+    group.span.thick += x;
+    group.span.weight = total;
+    group.span.distance = mean.x;
+    group.span.precipitation = mean.y;
+    group.span.above = mean.z;
+    group.width = at.width;
+    group.opacity = opacity;
+    return group;
 }
 
 // Factor on the light-group weight in rain. Rain is so thin that a tenth of a pixel's opacity extends over kilometres,
@@ -357,7 +363,8 @@ fn march_ray(direction: vec3f, turned: Turn, limit: f32, offset: f32, within: ve
     }
     // Consecutive full samples of zero density; from `empty_before_coarse` on, the march takes coarse steps.
     var empty = 0u;
-    var reached = 0.0; // sum of distances by weight, m
+    var reached = 0.0; // sum of distances by opacity, m
+    var ends = false; // whether what lies behind is negligible
     var group = Group();
     var groups: array<Group, GROUPS>;
     var count = 0u;
@@ -386,17 +393,19 @@ fn march_ray(direction: vec3f, turned: Turn, limit: f32, offset: f32, within: ve
             seen = select(seen, i, full || !searching);
             if density > 0.0 {
                 let x = density * frame.sky.extinction * at.length;
-                let weight = transmittance * x * one_minus_exp_over(x);
-                group = with_sample(group, weight, 1.0 - transmittance, at, column);
-                reached += weight * at.t;
+                let weight = sample_weight(transmittance, optical_depth, x);
+                group = with_sample(group, weight, optical_depth, x, 1.0 - transmittance, at, column);
+                reached += transmittance * x * one_minus_exp_over(x) * at.t;
                 span = vec2f(min(span.x, at.begin), at.begin + at.length);
                 optical_depth += x;
                 transmittance = transmittance_of(optical_depth);
-                i = select(i, end, transmittance < params.quality.min_transmittance);
+                ends = is_opaque(transmittance, optical_depth);
+                i = select(i, end, ends);
             }
             let of_rain = select(1.0, RAIN_SHARE, RAIN_SHAFTS && column.medium == RAIN);
             let share = rays * params.quality.light_group_weight * of_rain;
-            if group.weight > select(share, 0.0, i >= end) {
+            if group.span.weight > select(share, 0.0, i >= end) {
+                group.span.is_last = ends;
                 groups[count] = group;
                 count += 1u;
                 group = Group();
@@ -409,12 +418,12 @@ fn march_ray(direction: vec3f, turned: Turn, limit: f32, offset: f32, within: ve
             loop {
                 count -= 1u;
                 let lit = groups[count];
-                var depth_to_sun = 0.0;
+                var span = lit.span;
+                let p = span.distance * direction;
                 if SUNLIT && sunlit {
-                    depth_to_sun = optical_depth_to_sun(lit.distance * direction, lit.opacity, lit.width);
+                    span.depth_to_sun = depth_toward_sun(p, lit.opacity, lit.width);
                 }
-                let sun = seen_scattering(depth_to_sun, lit.precipitation, turned);
-                sum = gather(sum, nodes, lit.weight, sun, lit.above, lit.distance);
+                sum = gather(sum, nodes, lit_span(span, p, direction, turned));
                 if count == 0u {
                     break;
                 }
@@ -430,12 +439,14 @@ fn march_ray(direction: vec3f, turned: Turn, limit: f32, offset: f32, within: ve
         return Cloud(vec3f(0.0), 1.0, -1.0, NOWHERE);
     }
 
-    var scale = 1.0;
-    if transmittance < params.quality.min_transmittance {
-        // The rest of the ray is assumed to have the mean radiance of the marched part.
-        scale = 1.0 / (1.0 - transmittance);
+    let distance = reached / (1.0 - transmittance);
+    var radiance = gathered_radiance(sum, nodes, direction);
+    if ends {
+        radiance *= tail_scale(transmittance);
         transmittance = 0.0;
         span.y = EVERYWHERE.y;
+    } else {
+        radiance += forward_background(direction, transmittance, optical_depth);
     }
-    return Cloud(scale * gathered_radiance(sum, nodes, direction), transmittance, reached / weight, span);
+    return Cloud(radiance, transmittance, distance, span);
 }

@@ -20,8 +20,6 @@ const THICKEST = 0.5;
 // Largest difference, at level 0, of the optical depths toward the sun from the two points of a panel: behind a steep
 // edge light varies within a panel.
 const UNEVEN = 0.5;
-// Optical depth at which a ray ends: fully lit cloud behind it is negligible.
-const OPAQUE = 18.0;
 // Largest numbers of panels per ray at level 0, whatever the size of features: long rays through small features end,
 // too.
 const VIEW_PANELS = 4096.0;
@@ -61,6 +59,7 @@ fn reference(@builtin(global_invocation_id) id: vec3u) {
             ray.optical_depth = 0.0;
             ray.sun = vec4f(0.0);
             ray.above = vec4f(0.0);
+            ray.below = vec4f(0.0);
             ray.weight = vec4f(0.0);
             ray.distance = 0.0;
             ray.stage = VIEW;
@@ -112,8 +111,8 @@ fn reference(@builtin(global_invocation_id) id: vec3u) {
         } else {
             ray.end = panel.end;
             ray.density = reading.density;
-            ray.share = reading.share;
-            ray.precipitation = reading.precipitation;
+            ray.share = vec2f(sky_share(reading.first), sky_share(reading.second));
+            ray.precipitation = vec2f(reading.first.precipitation, reading.second.precipitation);
             ray.longest = 2.0 * (panel.end - panel.begin);
             ray.point = 0u;
             ray.sun_depth = 0.0;
@@ -141,33 +140,39 @@ fn reference(@builtin(global_invocation_id) id: vec3u) {
             let whole = Panel(ray.x, ray.end);
             let points = panel_points(whole);
             let x = panel_depth(whole, ray.density);
-            let weight = transmittance_of(ray.optical_depth) * x * one_minus_exp_over(x);
+            let transmittance = transmittance_of(ray.optical_depth);
+            let weight = transmittance * x * one_minus_exp_over(x);
             let first = first_share(x, ray.density);
-            var sun = vec2f(0.0);
-            if sunlit {
-                sun.x = seen_scattering(ray.first_depth, ray.precipitation.x, turned);
-                sun.y = seen_scattering(ray.sun_depth, ray.precipitation.y, turned);
-            }
+            let weights = sample_weight(transmittance, ray.optical_depth, x) * vec2f(first, 1.0 - first);
+            let distances = vec2f(stretch_distance(segments, points.x), stretch_distance(segments, points.y));
+            let part = x * ray.density / max(ray.density.x + ray.density.y, 1e-30);
+            let near = Span(
+                ray.optical_depth, part.x, weights.x, ray.first_depth, ray.precipitation.x, ray.share.x, distances.x,
+                false);
+            let far = Span(
+                ray.optical_depth + part.x, part.y, weights.y, ray.sun_depth, ray.precipitation.y, ray.share.y,
+                distances.y, false);
+            let a = lit_span(near, near.distance * direction, direction, turned);
+            let b = lit_span(far, far.distance * direction, direction, turned);
             let uneven = abs(ray.sun_depth - ray.first_depth) > finer * UNEVEN
-                && weight * abs(sun.x - sun.y) > 0.1 * params.quality.tolerance * (dot(ray.sun, vec4f(1.0)) + DARK);
+                && weight * abs(a.sun - b.sun) > 0.1 * params.quality.tolerance * (dot(ray.sun, vec4f(1.0)) + DARK);
             ray.stage = VIEW;
             if uneven && ray.end - ray.x > 1.5 * shortest_panel(segments, ray.x) {
                 ray.longest = 0.5 * (ray.end - ray.x);
             } else {
-                let weights = weight * vec2f(first, 1.0 - first);
-                let distances = vec2f(stretch_distance(segments, points.x), stretch_distance(segments, points.y));
-                var sum = Gathered(ray.sun, ray.above, ray.weight);
-                sum = gather(sum, nodes, weights.x, sun.x, ray.share.x, distances.x);
-                sum = gather(sum, nodes, weights.y, sun.y, ray.share.y, distances.y);
+                var sum = Gathered(ray.sun, ray.above, ray.below, ray.weight);
+                sum = gather(sum, nodes, a);
+                sum = gather(sum, nodes, b);
                 ray.sun = sum.sun;
                 ray.above = sum.above;
+                ray.below = sum.below;
                 ray.weight = sum.weight;
-                ray.distance += dot(weights, distances);
+                ray.distance += weight * dot(vec2f(first, 1.0 - first), distances);
                 ray.optical_depth += x;
                 ray.x = ray.end;
             }
         }
-        if empty || (ray.stage == VIEW && (ray.x >= length || ray.optical_depth > OPAQUE)) {
+        if empty || (ray.stage == VIEW && (ray.x >= length || ray.optical_depth > opaque_depth())) {
             ray = finished(ray, index, nodes, direction, empty);
         }
     }
@@ -179,9 +184,11 @@ fn reference(@builtin(global_invocation_id) id: vec3u) {
 // End of a ray: it has converged, or restarts with panels half as long.
 fn finished(given: ReferenceRay, index: u32, nodes: AerialPoints, direction: vec3f, empty: bool) -> ReferenceRay {
     var ray = given;
-    let sum = Gathered(ray.sun, ray.above, ray.weight);
-    let whole = gathered_weight(sum);
-    let result = vec4f(gathered_radiance(sum, nodes, direction), transmittance_of(ray.optical_depth));
+    let sum = Gathered(ray.sun, ray.above, ray.below, ray.weight);
+    let transmittance = transmittance_of(ray.optical_depth);
+    let whole = 1.0 - transmittance;
+    let radiance = gathered_radiance(sum, nodes, direction);
+    let result = vec4f(radiance + forward_background(direction, transmittance, ray.optical_depth), transmittance);
     let change = abs(result - ray.previous);
     let dark = DARK * sky_light[2].rgb;
     let tolerance = params.quality.tolerance;

@@ -3,6 +3,7 @@
 
 pub mod high_clouds;
 pub mod large_scale_weather;
+pub mod light_field;
 pub mod light_shafts;
 pub mod lut;
 pub mod majorant;
@@ -41,6 +42,7 @@ pub(crate) struct Luts {
     volume: volume::Volume,
     majorants: majorant::Majorants,
     ground_shadow: shadow::GroundShadow,
+    light_field: light_field::LightField,
     light_shafts: light_shafts::LightShafts,
 }
 
@@ -64,6 +66,7 @@ impl Luts {
             volume: Default::default(),
             majorants: Default::default(),
             ground_shadow: Default::default(),
+            light_field: Default::default(),
             light_shafts: Default::default(),
         }
     }
@@ -85,6 +88,7 @@ impl Luts {
         rec.specialize(inputs.specialization.clone()); // the bakes above are specialized for no picture
         self.volume.update(rec, inputs)?; // on a new grid
         self.majorants.update(rec, inputs)?; // for path tracing
+        self.light_field.update(rec, inputs)?; // on a step of clouds or eye, if the light model reads it
         self.ground_shadow.update(rec, inputs)?; // on a step of clouds or eye, if the shadows are visible
         self.light_shafts.update(rec, inputs) // on a step of clouds or eye or a new view, if clouds shade visible air
     }

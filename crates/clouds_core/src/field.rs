@@ -1,0 +1,95 @@
+//! Shape of the light field: nested levels around the eye, or one level over the user's grid.
+
+use glam::DVec3;
+
+use crate::clipmap::{self, Origin};
+use crate::params::{Model, Params, Quality};
+
+/// Levels of the light field.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct FieldShape {
+    /// Cells of the finest level across, along, and up.
+    pub cells: [u32; 3],
+    /// Cell of the finest level, m.
+    pub cell: [f32; 3],
+    /// Number of levels. Each has as many cells as the one before across and along, twice as wide.
+    pub levels: u32,
+    /// Number of levels beyond the finest whose rows are twice as high as those of the level before. Rows of further
+    /// levels have the height of the last of them, in flat cells.
+    pub halvings: u32,
+}
+
+/// Smallest number of rows of a level of clouds: with fewer, light below a deck of 400 m is 12 to 41 % too bright
+/// (docs/accuracy.md).
+const LEAST_ROWS: u32 = 10;
+/// Largest number of rows.
+const MOST_ROWS: u32 = 64;
+/// Half width of the coarsest level of clouds, m: clouds beyond hide behind nearer ones.
+const REACH: f32 = 75_000.0;
+/// Displacement of the clouds in m up to which the field is reused. A power of two (clipmap.rs).
+const CLOUD_STEP: f64 = 64.0;
+
+/// Whether a picture reads the light field.
+pub(crate) fn is_read(params: &Params) -> bool {
+    params.light.model == Model::Multiple && params.has_clouds()
+}
+
+impl FieldShape {
+    /// Shape for a sky. `altitude` is that of the eye in m.
+    pub fn new(params: &Params, quality: &Quality, altitude: f32) -> Self {
+        let across = quality.field_cells;
+        if let Some(grid) = &params.volume {
+            let [low, high] = grid.bounds();
+            let side = (high - low).as_vec3();
+            // Cubes: as many cells as a level of clouds has across, each way, but none smaller than a voxel.
+            let voxel = (side / glam::UVec3::from_array(grid.size().map(|n| n as u32)).as_vec3()).min_element();
+            let cube = (side.x * side.y * side.z).cbrt() / across as f32;
+            let cell = cube.max(voxel);
+            let cells = side.to_array().map(|side| ((side / cell).round() as u32).clamp(2, 4 * across));
+            let cell = std::array::from_fn(|axis| side[axis] / cells[axis] as f32);
+            return Self { cells, cell, levels: 1, halvings: 0 };
+        }
+        let [base, top] = params.shell();
+        let thick = top - base;
+        // Cells double with the altitude of the eye, as pixels do.
+        let wide = quality.field_cell * (altitude.max(top) / 12_000.0).max(1.0).log2().floor().exp2();
+        let thinnest = if params.has_upper_clouds() {
+            (params.clouds.top - params.clouds.base).min(params.upper_clouds.top - params.upper_clouds.base)
+        } else {
+            thick
+        };
+        let height = wide.min(thinnest / LEAST_ROWS as f32);
+        let rows = ((thick / height).ceil() as u32).clamp(LEAST_ROWS, MOST_ROWS);
+        let halvings = (rows / LEAST_ROWS).ilog2();
+        let rows = rows.next_multiple_of(1 << halvings);
+        let height = thick / rows as f32;
+        let wide = wide.max(height);
+        let levels = (REACH / (0.5 * wide * across as f32)).max(1.0).log2().ceil() as u32 + 1;
+        Self { cells: [across, across, rows], cell: [wide, wide, height], levels: levels.clamp(1, 8), halvings }
+    }
+
+    /// Rows of a level.
+    pub fn rows(&self, level: u32) -> u32 {
+        self.cells[2] >> level.min(self.halvings)
+    }
+
+    /// Rows of all levels before one.
+    pub fn rows_before(&self, level: u32) -> u32 {
+        (0..level).map(|finer| self.rows(finer)).sum()
+    }
+
+    /// Cell of a level, m.
+    pub fn cell(&self, level: u32) -> [f32; 3] {
+        let [x, y, z] = self.cell;
+        let wide = (1 << level) as f32;
+        [wide * x, wide * y, z * self.cells[2] as f32 / self.rows(level) as f32]
+    }
+}
+
+/// Origin of the light field of a picture. A user-supplied grid does not move with time.
+pub(crate) fn origin(eye: DVec3, params: &Params, time: f64) -> Origin {
+    if params.volume.is_some() {
+        return Origin { steps: [0; 3], place: glam::DVec2::ZERO, time: 0.0 };
+    }
+    clipmap::Origin::new(eye, params, time, CLOUD_STEP)
+}

@@ -1,0 +1,332 @@
+//! Light field: light in clouds of every order of scattering, solved on nested levels (passes/light_field).
+
+use glam::DVec3;
+
+use super::lut::{Inputs, Lut, view};
+use super::volume::Grid;
+use crate::camera::Camera;
+use crate::clipmap::{Casters, casters};
+use crate::error::Result;
+use crate::field::{self, FieldShape};
+use crate::frame::Frame;
+use crate::gpu::{Binding, Bindings, Recorder};
+use crate::params;
+use crate::scattering::{FORWARD_SIZE, forward_table};
+use crate::shared::constants;
+use crate::uniforms::{FieldLevel, uniform};
+
+constants! {
+    /// Sides of a level: dark but for the sky.
+    const SIDES_OPEN: u32 = 0;
+    /// Sides of a level: what leaves at one side enters at the other.
+    const SIDES_PERIODIC: u32 = 1;
+    /// Sides of a level: radiance of the coarser level around it.
+    const SIDES_COARSER: u32 = 2;
+}
+
+/// Directions of the lattice.
+const DIRECTIONS: u64 = 14;
+/// Sweeps of the coarsest grid, of each further grid of the cascade that starts a level, and of the levels from the
+/// second finest and the finest: the error of the fluence by the number of sweeps is in docs/accuracy.md.
+const CASCADE_SWEEPS: [u32; 3] = [16, 10, 8];
+const LEVEL_SWEEPS: [u32; 2] = [6, 3];
+/// Upper bound of the spectrum of a sweep that Chebyshev's iteration assumes. Eigenvalues are complex: 0.93 is the
+/// limit of stability, and 0.97 diverges.
+const SPECTRUM: f64 = 0.9;
+/// Cells that a ray toward the sun crosses in a level before it reads the coarser one.
+const SUN_CELLS: u32 = 12;
+/// Largest number of cells that it crosses in a level without a coarser one.
+const MOST_SUN_CELLS: f32 = 512.0;
+
+/// Key of the field: shadow casters, light, planet and grid, snapped position and time, shape, whether the sun is up.
+type Key = (Casters, params::Light, (f32, Grid), [i64; 3], FieldShape, bool);
+
+/// Light field on the GPU.
+#[derive(Default)]
+pub(crate) struct LightField {
+    lut: Lut<Key, [wgpu::TextureView; 3]>,
+    forward: Lut<params::Light>,
+}
+
+/// Grid of cells that is solved, and how its solution is obtained.
+#[derive(Clone, Debug)]
+struct Stage {
+    cells: [u32; 3],
+    cell: [f32; 3],
+    sides: u32,
+    sweeps: u32,
+    /// Level of the field that it is, if any.
+    level: Option<u32>,
+}
+
+/// Solution of a stage.
+struct Solution {
+    stage: Stage,
+    optics: wgpu::TextureView,
+    moments: wgpu::Buffer,
+    radiances: wgpu::Buffer,
+}
+
+impl Stage {
+    fn count(&self) -> u64 {
+        self.cells.iter().map(|n| u64::from(*n)).product()
+    }
+}
+
+/// Stages of a field, from the coarsest.
+fn stages(shape: &FieldShape, sides: u32) -> Vec<Stage> {
+    let last = shape.levels - 1;
+    let outermost = Stage {
+        cells: [shape.cells[0], shape.cells[1], shape.rows(last)],
+        cell: shape.cell(last),
+        sides,
+        sweeps: 0,
+        level: Some(last),
+    };
+    // A cascade of coarser grids over the same box: slow modes of the light are cheap there.
+    let mut cascade = vec![outermost];
+    while cascade.len() < 4 {
+        let fine = &cascade[cascade.len() - 1];
+        let halved = |n: u32| if n >= 16 { n / 2 } else { n };
+        let rows = if sides == SIDES_OPEN { halved(fine.cells[2]) } else { fine.cells[2] };
+        let cells = [halved(fine.cells[0]), halved(fine.cells[1]), rows];
+        if cells == fine.cells {
+            break;
+        }
+        let cell = std::array::from_fn(|axis| fine.cell[axis] * fine.cells[axis] as f32 / cells[axis] as f32);
+        cascade.push(Stage { cells, cell, level: None, ..fine.clone() });
+    }
+    cascade.reverse();
+    for (index, stage) in cascade.iter_mut().enumerate() {
+        stage.sweeps = CASCADE_SWEEPS[index.min(CASCADE_SWEEPS.len() - 1)];
+    }
+    for level in (0..last).rev() {
+        let cells = [shape.cells[0], shape.cells[1], shape.rows(level)];
+        let sweeps = LEVEL_SWEEPS[usize::from(level == 0)];
+        cascade.push(Stage { cells, cell: shape.cell(level), sides: SIDES_COARSER, sweeps, level: Some(level) });
+    }
+    cascade
+}
+
+/// Weights of the steps of Chebyshev's iteration: factor on the change by a sweep, and on the step.
+fn chebyshev(sweeps: u32) -> Vec<[f32; 2]> {
+    let (mu, relaxation) = (SPECTRUM / (2.0 - SPECTRUM), 2.0 / (2.0 - SPECTRUM));
+    let mut weight = 1.0;
+    let steps = (0..sweeps).map(|k| {
+        weight = match k {
+            0 => 1.0,
+            1 => 1.0 / (1.0 - 0.5 * mu * mu),
+            _ => 1.0 / (1.0 - 0.25 * mu * mu * weight),
+        };
+        [relaxation as f32, weight as f32]
+    });
+    steps.collect()
+}
+
+/// Sky in which a field is solved.
+struct Sun {
+    /// Unit vector toward the sun in the axes of the field.
+    toward: [f32; 3],
+    is_up: bool,
+    /// Half of the reciprocal of the planet's radius, 1/m; 0 in the straight box of a grid.
+    bend: f32,
+}
+
+/// Solves a stage. `density` records the bake of the densities into a texture.
+fn solve(
+    rec: &mut Recorder<'_>,
+    stage: Stage,
+    sun: &Sun,
+    coarser: Option<&Solution>,
+    frame: &Bindings,
+    density: impl FnOnce(&mut Recorder<'_>, Bindings, &wgpu::TextureView),
+) -> Solution {
+    let count = stage.count();
+    let [densities, optics] = ["densities", "optics"].map(|label| view(&rec.gpu.texture_3d(label, stage.cells)));
+    let [mut now, mut before] = ["moments", "moments"].map(|label| rec.gpu.buffer(label, 32 * count));
+    let sources = rec.gpu.buffer("sources", 32 * count);
+    let deposits = rec.gpu.buffer("deposits", 8 * count);
+    let radiances = rec.gpu.buffer("radiances", 8 * DIRECTIONS * count);
+    let rim = u64::from((stage.cells[0] + stage.cells[1]) * stage.cells[2]);
+    let entering = rec.gpu.buffer("entering", 8 * DIRECTIONS * rim);
+    let balance = rec.gpu.buffer("balance", 16);
+    let level = level_block(&stage, sun, coarser.map(|coarser| &coarser.stage));
+    let bindings = |level: &FieldLevel, more: Bindings| -> Bindings {
+        let mut bindings = more;
+        bindings.extend([
+            ("level", uniform(&[level])),
+            ("sources", (&sources).into()),
+            ("deposits", (&deposits).into()),
+            ("radiances", (&radiances).into()),
+            ("entering", (&entering).into()),
+            ("balance", (&balance).into()),
+        ]);
+        if let Some(coarser) = coarser {
+            bindings.push(("coarser_moments", (&coarser.moments).into()));
+            bindings.push(("coarser_radiances", (&coarser.radiances).into()));
+            bindings.push(("coarser_optics", (&coarser.optics).into()));
+        } else {
+            // Not read without a coarser level.
+            bindings.push(("coarser_moments", (&sources).into()));
+            bindings.push(("coarser_radiances", (&entering).into()));
+        }
+        bindings.extend(frame.iter().cloned());
+        bindings
+    };
+    let [x, y, z] = stage.cells;
+    density(rec, bindings(&level, vec![]), &densities);
+    let own: Bindings = vec![("level_optics", (&densities).into()), ("volume_out", (&optics).into())];
+    rec.dispatch(("light_field", "field_depth"), bindings(&level, own), stage.cells);
+    let optics_in = || vec![("level_optics", Binding::from(&optics))];
+    rec.dispatch(("light_field", "field_beam"), bindings(&level, optics_in()), [count as u32, 1, 1]);
+    rec.dispatch(("light_field", "field_balance"), bindings(&level, optics_in()), [256, 1, 1]);
+    rec.dispatch(("light_field", "field_entering"), bindings(&level, vec![]), [rim as u32, DIRECTIONS as u32, 1]);
+    let moments = |now: &wgpu::Buffer, before: &wgpu::Buffer| -> Bindings {
+        vec![("moments_now", now.into()), ("moments_before", before.into())]
+    };
+    rec.dispatch(("light_field", "field_start"), bindings(&level, moments(&now, &before)), [count as u32, 1, 1]);
+    for [relaxation, weight] in chebyshev(stage.sweeps) {
+        rec.dispatch(("light_field", "field_sweep_down"), bindings(&level, vec![]), [x, y, 10]);
+        rec.dispatch(("light_field", "field_sweep_along"), bindings(&level, vec![]), [x.max(y), z, 4]);
+        let step = FieldLevel { relaxation, weight, ..level.clone() };
+        rec.dispatch(("light_field", "field_gather"), bindings(&step, moments(&now, &before)), [count as u32, 1, 1]);
+        std::mem::swap(&mut now, &mut before);
+    }
+    Solution { stage, optics, moments: now, radiances }
+}
+
+/// Uniform block of a stage.
+fn level_block(stage: &Stage, sun: &Sun, coarser: Option<&Stage>) -> FieldLevel {
+    let speed = (0..3).map(|axis| sun.toward[axis].abs() / stage.cell[axis]).fold(0.0, f32::max);
+    let height = stage.cell[2] * stage.cells[2] as f32;
+    // Until the ray leaves at the top, or at a side.
+    let way = match stage.sides {
+        SIDES_OPEN => {
+            let side = |axis: usize| stage.cell[axis] * stage.cells[axis] as f32;
+            side(0).hypot(side(1)).hypot(side(2))
+        }
+        _ => {
+            let mu = sun.toward[2].max(0.0);
+            2.0 * height / (mu + (mu * mu + 4.0 * sun.bend * height).sqrt()).max(1e-6)
+        }
+    };
+    let sun_steps = match stage.sides {
+        SIDES_COARSER => SUN_CELLS,
+        _ => ((way * speed).ceil() + 1.0).min(MOST_SUN_CELLS) as u32,
+    };
+    let mut level = FieldLevel {
+        across: stage.cells[0],
+        along: stage.cells[1],
+        rows: stage.cells[2],
+        sides: stage.sides,
+        cell: stage.cell,
+        sun: sun.toward,
+        sunlit: sun.is_up.into(),
+        bend: sun.bend,
+        sun_steps,
+        ..FieldLevel::default()
+    };
+    if let Some(coarser) = coarser {
+        [level.coarser_across, level.coarser_along, level.coarser_rows] = coarser.cells;
+        level.coarser_scale = std::array::from_fn(|axis| stage.cell[axis] / coarser.cell[axis]);
+    }
+    level
+}
+
+impl LightField {
+    pub fn update(&mut self, rec: &mut Recorder<'_>, inputs: &Inputs<'_>) -> Result<()> {
+        let Inputs { params, quality, frame, eye, time, .. } = *inputs;
+        if !field::is_read(params) {
+            return Ok(());
+        }
+        let forward = self.forward.update(rec, params.light.clone(), |rec| {
+            let [columns, rows] = FORWARD_SIZE.map(|n| n as u32);
+            let texture = rec.gpu.flat("forward_table", [columns, rows], wgpu::TextureFormat::R32Float);
+            rec.gpu.write_texture(&texture, &forward_table(&params.light));
+            Ok(view(&texture))
+        })?;
+        let shape = FieldShape::new(params, quality, frame.view.altitude);
+        let lit = frame.sunlit(params);
+        let planet = (params.atmosphere.planet_radius, Grid(params.volume.clone()));
+        let key = (casters(params), params.light.clone(), planet, field::origin(eye, params, time).steps, shape, lit);
+        let textures = self.lut.update(rec, key, |rec| bake(rec, inputs, &shape, lit))?;
+        let names = ["field_optics", "field_sun", "field_sky"];
+        rec.bind(names.into_iter().zip(textures.iter().map(Binding::from)));
+        rec.bind([("forward_table", (&forward).into())]);
+        Ok(())
+    }
+}
+
+/// Solves all levels, and stores them in one stack of textures: optics, sun's field, sky's field.
+fn bake(rec: &mut Recorder<'_>, inputs: &Inputs<'_>, shape: &FieldShape, lit: bool) -> Result<[wgpu::TextureView; 3]> {
+    let Inputs { params, eye, time, frame, .. } = *inputs;
+    let origin = field::origin(eye, params, time);
+    let centre: DVec3 = origin.place.extend(0.0);
+    let mut there = Frame::new(&Camera::equirect(centre)?, params, origin.time, [1, 1]);
+    there.set_field(centre, params, origin.time, inputs.quality);
+    let toward = there.in_field(glam::Vec3::from_array(there.sky.sun_direction)).to_array();
+    let bend = if params.volume.is_some() { 0.0 } else { 0.5 / params.atmosphere.planet_radius };
+    let sun = Sun { toward, is_up: lit, bend };
+    there.dispatch = frame.dispatch.clone();
+    let bindings = there.bindings(rec.gpu).to_vec();
+    let whole = [shape.cells[0], shape.cells[1], shape.rows_before(shape.levels)];
+    let stacks = ["field_optics", "field_sun", "field_sky"].map(|label| view(&rec.gpu.texture_3d(label, whole)));
+    let sides = if params.volume.is_some() { SIDES_OPEN } else { SIDES_PERIODIC };
+    let mut coarser: Option<Solution> = None;
+    for stage in stages(shape, sides) {
+        let size = stage.cells;
+        let density = |rec: &mut Recorder<'_>, mut given: Bindings, out: &wgpu::TextureView| {
+            given.insert(0, ("volume_out", out.into()));
+            rec.dispatch(("light_field", "field_density"), given, size);
+        };
+        let solved = solve(rec, stage, &sun, coarser.as_ref(), &bindings, density);
+        if let Some(number) = solved.stage.level {
+            let mut level = level_block(&solved.stage, &sun, coarser.as_ref().map(|coarser| &coarser.stage));
+            level.first_row = shape.rows_before(number);
+            let other = coarser.as_ref().unwrap_or(&solved);
+            let [optics_out, sun_out, sky_out] = &stacks;
+            let own: Bindings = vec![
+                ("level", uniform(&[&level])),
+                ("level_optics", (&solved.optics).into()),
+                ("moments_now", (&solved.moments).into()),
+                ("coarser_optics", (&other.optics).into()),
+                ("coarser_moments", (&other.moments).into()),
+                ("volume_out", optics_out.into()),
+                ("sun_out", sun_out.into()),
+                ("sky_out", sky_out.into()),
+            ];
+            rec.dispatch(("light_field", "field_store"), [own, bindings.clone()].concat(), solved.stage.cells);
+        }
+        coarser = Some(solved);
+    }
+    Ok(stacks)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Levels lie in the middle of coarser ones, and the cascade ends at the outermost.
+    #[test]
+    fn stages_go_from_the_coarsest_to_the_finest() {
+        let shape = FieldShape { cells: [64, 64, 20], cell: [100.0, 100.0, 100.0], levels: 5, halvings: 1 };
+        let stages = stages(&shape, SIDES_PERIODIC);
+        let levels: Vec<_> = stages.iter().map(|stage| stage.level).collect();
+        assert_eq!(levels, [None, None, None, Some(4), Some(3), Some(2), Some(1), Some(0)]);
+        for stage in &stages {
+            assert!((stage.cell[2] * stage.cells[2] as f32 - 2000.0).abs() < 1e-3, "{stage:?}");
+        }
+    }
+
+    #[test]
+    fn chebyshev_damps_the_slowest_mode() {
+        // A mode of eigenvalue 0.9, started at an error of 1.
+        let (mut now, mut before) = (1.0_f64, 1.0_f64);
+        for [relaxation, weight] in chebyshev(12) {
+            let stepped = now + f64::from(relaxation) * (0.9 * now - now);
+            let next = before + f64::from(weight) * (stepped - before);
+            (before, now) = (now, next);
+        }
+        assert!(now.abs() < 0.01, "{now}");
+    }
+}

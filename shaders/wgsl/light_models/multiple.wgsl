@@ -1,0 +1,135 @@
+// Light model `multiple`: every order of scattering. A phase function is split into light that keeps going, with the
+// moments of a forward peak, and light that turns. Light that only kept going has closed forms along straight rays; light
+// that has turned comes from the light field (passes/light_field). A single turn between two forward chains is a closed
+// form, too, and is not part of the field. Nothing is fitted.
+#import bindings
+#import math
+#import droplets
+#import light
+#import light_field
+
+const AMBIENT = true;
+
+// Reach of the relief samples, in cells of the light field along the ray toward the sun.
+const RELIEF_CELLS = 2.0;
+
+fn lobe_phase(one_minus_mu: f32) -> f32 {
+    return henyey_greenstein(one_minus_mu, params.light.g);
+}
+
+// Weight of a sample: share of the eye's light that it turns or absorbs. What it scatters forward reaches what lies
+// behind.
+fn sample_weight(transmittance: f32, depth: f32, x: f32) -> f32 {
+    let scaled = frame.sky.split.z * x;
+    return exp(-frame.sky.split.z * depth) * scaled * one_minus_exp_over(scaled);
+}
+
+fn is_opaque(transmittance: f32, depth: f32) -> bool {
+    return exp(-frame.sky.split.z * depth) < params.quality.min_transmittance;
+}
+
+// The last span of a ray that ends early stands for all behind it.
+fn tail_scale(transmittance: f32) -> f32 {
+    return 1.0;
+}
+
+fn opaque_depth() -> f32 {
+    return min(18.0 / frame.sky.split.z, 1000.0);
+}
+
+fn sky_share(column: WeatherSample) -> f32 {
+    return 0.0;
+}
+
+// Optical depth toward the sun: of relief finer than a cell by samples of the density, from there on by the light field.
+// Segment k of n starts at (k / n)^2 of the reach.
+fn depth_toward_sun(p: vec3f, opacity: f32, width: f32) -> f32 {
+    let sun = frame.sky.sun_direction;
+    let altitude = altitude_at(p);
+    let q = field_place(p, altitude);
+    let along = abs(field_direction(sun, cos_zenith_at(p, sun)));
+    let cell = frame.sky.field_cell * vec3f(vec2f(exp2(field_level(q))), 1.0);
+    let reach = RELIEF_CELLS / max(max(along.x / cell.x, along.y / cell.y), along.z / cell.z);
+    let n = params.quality.relief_samples;
+    var depth = 0.0;
+    var begin = 0.0;
+    if n > 0u {
+        var i = 0u;
+        loop {
+            i += 1u;
+            let end = reach * f32(i * i) / f32(n * n);
+            let at = p + 0.5 * (begin + end) * sun;
+            depth += (end - begin) * cloud_density_at(at, altitude_at(at), max(width, 0.5 * (end - begin)));
+            begin = end;
+            if i >= n {
+                break;
+            }
+        }
+    }
+    let far = p + begin * sun;
+    return frame.sky.extinction * depth + field_sun_depth(field_place(far, altitude_at(far)));
+}
+
+fn lit_span(span: Span, p: vec3f, direction: vec3f, turned: Turn) -> Lit {
+    let forward = frame.sky.split.x;
+    let scale = frame.sky.split.z;
+    let source = frame.sky.split.w; // scaled albedo / 4 pi
+    let albedo = params.light.albedo;
+    let end = span.start + span.thick;
+    let weight = exp(-scale * span.start) * select(1.0 - exp(-scale * span.thick), 1.0, span.is_last);
+    let seen = exp(-span.start) * select(1.0 - exp(-span.thick), 1.0, span.is_last);
+    // Light that keeps going, and light that turns once.
+    let cosine = 1.0 - turned.one_minus_mu;
+    let to_sun = span.depth_to_sun;
+    let beam = exp(-to_sun) * seen;
+    let scaled_beam = exp(-scale * to_sun) * weight / scale;
+    let turn = (1.0 - forward + 3.0 * (frame.sky.split.y - forward) * cosine) / (4.0 * PI);
+    var chains = forward_chains(to_sun + span.start + 0.5 * span.thick, turned.one_minus_mu) * span.thick;
+    if span.is_last {
+        chains += forward_chains(to_sun + end, turned.one_minus_mu) / scale;
+    }
+    var sun = albedo * (turned.phase * beam + chains + turn * (scaled_beam - beam));
+    // Light that has turned before.
+    let altitude = altitude_at(p);
+    let q = field_place(p, altitude);
+    let uvw = field_texel(q, field_level(q));
+    let of_sun = textureSampleLevel(field_sun, clamp_sampler, uvw, 0.0);
+    let of_sky = textureSampleLevel(field_sky, clamp_sampler, uvw, 0.0);
+    let ray = field_direction(direction, cos_zenith_at(p, direction));
+    let toward_eye = vec4f(1.0, -3.0 * frame.sky.turned_cosine * ray);
+    sun = max(sun / max(weight, 1e-20) + source * dot(of_sun, toward_eye), 0.0);
+    // Without clouds the sky has half of the sphere, and the ground the other.
+    let above = clamp(source * dot(of_sky, toward_eye), 0.0, 4.0 * PI * source);
+    return Lit(weight, sun, above, 4.0 * PI * source - above, span.distance);
+}
+
+// Radiance per unit of irradiance and of optical depth of a thin layer.
+fn seen_scattering(depth: f32, precipitation: f32, turned: Turn) -> f32 {
+    let forward = frame.sky.split.x;
+    let scale = frame.sky.split.z;
+    let cosine = 1.0 - turned.one_minus_mu;
+    let turn = (1.0 - forward + 3.0 * (frame.sky.split.y - forward) * cosine) / (4.0 * PI);
+    let sum = turned.phase * exp(-depth) + forward_chains(depth, turned.one_minus_mu)
+        + turn * (exp(-scale * depth) - exp(-depth));
+    return params.light.albedo * max(sum, 0.0);
+}
+
+fn slowest_extinction() -> f32 {
+    return frame.sky.split.z;
+}
+
+fn ambient_light(above: f32, below: f32, sky: vec3f, ground: vec3f) -> vec3f {
+    return above * ambient_above(sky) + below * ambient_below(ground);
+}
+
+fn forward_background(direction: vec3f, transmittance: f32, depth: f32) -> vec3f {
+    let share = max(exp(-frame.sky.split.z * depth) - transmittance, 0.0);
+    var behind = params.light.ambient;
+    if AIR {
+        let way = air_segment(direction);
+        if !way.grounded {
+            behind += params.light.ambient_gain * sky_radiance(direction);
+        }
+    }
+    return share * behind;
+}

@@ -1,0 +1,50 @@
+// Light of the models that march toward the sun: `seen_scattering` of a light model for the optical depth toward the sun,
+// and ambient light by two streams.
+#import math
+#import light
+#import ambient
+
+// Weight of a sample of optical depth `x` behind a transmittance: the share of the eye's light that it scatters.
+fn sample_weight(transmittance: f32, depth: f32, x: f32) -> f32 {
+    return transmittance * x * one_minus_exp_over(x);
+}
+
+// Whether what lies behind is negligible.
+fn is_opaque(transmittance: f32, depth: f32) -> bool {
+    return transmittance < params.quality.min_transmittance;
+}
+
+// Factor on the radiance of a ray that ends early: the rest is assumed to have the mean radiance of the marched part.
+fn tail_scale(transmittance: f32) -> f32 {
+    return 1.0 / (1.0 - transmittance);
+}
+
+// Optical depth at which a converged ray ends: fully lit cloud behind it is negligible.
+fn opaque_depth() -> f32 {
+    return 18.0;
+}
+
+// Fraction of the ambient light at a sample that comes from above.
+fn sky_share(column: WeatherSample) -> f32 {
+    return ambient_share(column);
+}
+
+// Optical depth from a sample toward the sun.
+fn depth_toward_sun(p: vec3f, opacity: f32, width: f32) -> f32 {
+    return optical_depth_to_sun(p, opacity, width);
+}
+
+fn lit_span(span: Span, p: vec3f, direction: vec3f, turned: Turn) -> Lit {
+    let sun = seen_scattering(span.depth_to_sun, span.precipitation, turned);
+    return Lit(span.weight, sun, span.above, 1.0 - span.above, span.distance);
+}
+
+// Ambient light of a sky and a ground of the given radiances.
+fn ambient_light(above: f32, below: f32, sky: vec3f, ground: vec3f) -> vec3f {
+    return above * ambient_above(clouded_sky(sky)) + below * ambient_below(ground_share() * ground);
+}
+
+// Light of the background that clouds have scattered forward.
+fn forward_background(direction: vec3f, transmittance: f32, depth: f32) -> vec3f {
+    return vec3f(0.0);
+}

@@ -91,13 +91,18 @@ override LIGHT_CHEAP: bool = true; // light samples without detail noise
 @group(0) @binding(90) var<storage, read_write> coarser_moments: array<vec4f>;
 @group(0) @binding(91) var<storage, read_write> sources: array<vec4f>; // of sun and sky
 @group(0) @binding(92) var<storage, read_write> deposits: array<vec2f>; // scaled extinction, 1/m; scaled sunlight
-// Radiance by direction, of sun and sky: mean in each cell, the same of the coarser level, and what enters at the sides.
-@group(0) @binding(93) var<storage, read_write> radiances: array<vec2f>;
-@group(0) @binding(94) var<storage, read_write> coarser_radiances: array<vec2f>;
+// Radiance by direction, of sun and sky: mean in each cell and the same of the coarser level, in pairs of half floats; what
+// enters at the sides.
+@group(0) @binding(93) var<storage, read_write> radiances: array<u32>;
+@group(0) @binding(94) var<storage, read_write> coarser_radiances: array<u32>;
 @group(0) @binding(95) var<storage, read_write> entering: array<vec2f>;
 @group(0) @binding(96) var<storage, read_write> balance: array<vec4f>; // factor on the sunlight of all cells
 @group(0) @binding(97) var sun_out: texture_storage_3d<rgba16float, write>;
 @group(0) @binding(98) var sky_out: texture_storage_3d<rgba16float, write>;
+// Light on the ground, mean of a level: irradiance of the sun, direct and diffuse, for a sun of irradiance 1; irradiance of
+// a uniform sky over that without clouds; direct part; sine of the sun's elevation.
+@group(0) @binding(99) var<storage, read_write> ground_out: array<vec4f>;
+@group(0) @binding(100) var<uniform> field_ground: vec4f;
 
 // Buffers with an entry for each pixel, row by row. Those of the clouds have an entry for each sample of the sample
 // grid (sample_grid.wgsl).

@@ -5,7 +5,7 @@
 #import chart
 
 // Place of a point given in cells of the level, m: horizontal on the chart, from the middle of the field, and height above
-// the lowest clouds. In the user's grid: from the grid's lowest corner.
+// its base. In the user's grid: from the lowest corner of the field, a cell beyond that of the grid.
 fn level_place(cell: vec3f) -> vec3f {
     let corner = select(0.5 * vec2f(f32(level.across), f32(level.along)), vec2f(0.0), VOLUME);
     return vec3f(cell.xy - corner, cell.z) * level.cell;
@@ -21,9 +21,9 @@ fn coarser_cell(cell: vec3f) -> vec3f {
 // Place of a point `p`, relative to the eye, in the field (`level_place`).
 fn field_place(p: vec3f, altitude: f32) -> vec3f {
     if VOLUME {
-        return p - frame.sky.volume_low;
+        return p - frame.sky.volume_low + frame.sky.field_cell;
     }
-    return vec3f(on_chart(p, altitude) + frame.sky.field_eye, altitude - frame.sky.shell_base);
+    return vec3f(on_chart(p, altitude) + frame.sky.field_eye, altitude - frame.sky.field_base);
 }
 
 // Components of a direction at a point along the axes of the field; `mu` is its zenith cosine there.

@@ -39,9 +39,14 @@ fn lit_span(span: Span, p: vec3f, direction: vec3f, turned: Turn) -> Lit {
     return Lit(span.weight, sun, span.above, 1.0 - span.above, span.distance);
 }
 
+// Light of the ground under clouds relative to that of the ground without clouds.
+fn ground_factor(mu: f32) -> vec3f {
+    return vec3f(ground_share());
+}
+
 // Ambient light of a sky and a ground of the given radiances.
 fn ambient_light(above: f32, below: f32, sky: vec3f, ground: vec3f) -> vec3f {
-    return above * ambient_above(clouded_sky(sky)) + below * ambient_below(ground_share() * ground);
+    return above * ambient_above(clouded_sky(sky)) + below * ambient_below(ground);
 }
 
 // Light of the background that clouds have scattered forward.

@@ -12,6 +12,8 @@ pub(crate) struct FieldShape {
     pub cells: [u32; 3],
     /// Cell of the finest level, m.
     pub cell: [f32; 3],
+    /// Altitude of the base of the lowest row, m; of a grid, the base of its box less a cell.
+    pub base: f32,
     /// Number of levels. Each has as many cells as the one before across and along, twice as wide.
     pub levels: u32,
     /// Number of levels beyond the finest whose rows are twice as high as those of the level before. Rows of further
@@ -24,6 +26,8 @@ pub(crate) struct FieldShape {
 const LEAST_ROWS: u32 = 10;
 /// Largest number of rows.
 const MOST_ROWS: u32 = 64;
+/// Largest number of cells of a grid's level: its radiances, of 72 bytes per cell, fit a buffer of 128 MiB.
+const MOST_CELLS: f32 = 1.5e6;
 /// Half width of the coarsest level of clouds, m: clouds beyond hide behind nearer ones.
 const REACH: f32 = 75_000.0;
 /// Displacement of the clouds in m up to which the field is reused. A power of two (clipmap.rs).
@@ -43,11 +47,13 @@ impl FieldShape {
             let side = (high - low).as_vec3();
             // Cubes: as many cells as a level of clouds has across, each way, but none smaller than a voxel.
             let voxel = (side / glam::UVec3::from_array(grid.size().map(|n| n as u32)).as_vec3()).min_element();
-            let cube = (side.x * side.y * side.z).cbrt() / across as f32;
+            let most = (across as f32).powi(3).min(MOST_CELLS);
+            let cube = (side.x * side.y * side.z / most).cbrt();
             let cell = cube.max(voxel);
             let cells = side.to_array().map(|side| ((side / cell).round() as u32).clamp(2, 4 * across));
-            let cell = std::array::from_fn(|axis| side[axis] / cells[axis] as f32);
-            return Self { cells, cell, levels: 1, halvings: 0 };
+            let cell: [f32; 3] = std::array::from_fn(|axis| side[axis] / cells[axis] as f32);
+            // An empty cell on each side: the light at a face is between that of a cell inside and one outside.
+            return Self { cells: cells.map(|n| n + 2), cell, base: low.z as f32 - cell[2], levels: 1, halvings: 0 };
         }
         let [base, top] = params.shell();
         let thick = top - base;
@@ -59,13 +65,15 @@ impl FieldShape {
             thick
         };
         let height = wide.min(thinnest / LEAST_ROWS as f32);
-        let rows = ((thick / height).ceil() as u32).clamp(LEAST_ROWS, MOST_ROWS);
+        // An empty row below and above the clouds, as beside a grid.
+        let rows = ((thick / height).ceil() as u32 + 2).clamp(LEAST_ROWS, MOST_ROWS);
         let halvings = (rows / LEAST_ROWS).ilog2();
         let rows = rows.next_multiple_of(1 << halvings);
-        let height = thick / rows as f32;
+        let height = thick / (rows - 2) as f32;
         let wide = wide.max(height);
         let levels = (REACH / (0.5 * wide * across as f32)).max(1.0).log2().ceil() as u32 + 1;
-        Self { cells: [across, across, rows], cell: [wide, wide, height], levels: levels.clamp(1, 8), halvings }
+        let (cells, cell) = ([across, across, rows], [wide, wide, height]);
+        Self { cells, cell, base: base - height, levels: levels.clamp(1, 8), halvings }
     }
 
     /// Rows of a level.

@@ -604,6 +604,7 @@ impl Frame {
         let [across, along, rows] = shape.cells.map(|n| n as f32);
         self.sky.field_size = [across, along, rows, shape.levels as f32];
         self.sky.field_cell = shape.cell;
+        self.sky.field_base = shape.base;
         self.sky.field_halvings = shape.halvings;
         if params.volume.is_some() {
             return;

@@ -141,6 +141,8 @@ crate::params! {
         field_size: [f32; 4] = [1.0; 4];
         /// Cell of the finest level, m.
         field_cell: [f32; 3] = [1.0; 3];
+        /// Altitude of the base of the lowest row, m.
+        field_base: f32 = 0.0;
         /// Number of levels beyond the finest whose rows are twice as high as those of the level before.
         field_halvings: u32 = 0;
         /// Position of the eye relative to the middle of the light field, after advection, on the chart, m.
@@ -290,6 +292,8 @@ crate::params! {
         sunlit: u32 = 0;
         /// Curvature of the ground, half of the reciprocal of its radius, 1/m.
         bend: f32 = 0.0;
+        /// Whether the tilted directions cross a row in less than a cell, in flat cells.
+        tilt_crosses: u32 = 0;
         /// Largest number of cells that a ray toward the sun crosses in this level.
         sun_steps: u32 = 1;
         /// Factor on the change by a sweep.

@@ -118,6 +118,18 @@ fn slowest_extinction() -> f32 {
     return frame.sky.split.z;
 }
 
+// Light of the ground under clouds relative to that of the ground without clouds: of the sun's and the sky's light that
+// reaches it, and of what clouds send back.
+fn ground_factor(mu: f32) -> vec3f {
+    if VOLUME {
+        return vec3f(1.0);
+    }
+    let sun = sun_irradiance(0.0, mu) / max(field_ground.w, 1e-3);
+    let sky = PI * light_from_above(0.0, mu);
+    let mean = (sun * field_ground.x + sky * field_ground.y) / max(sun * field_ground.w + sky, vec3f(1e-30));
+    return mean / (1.0 - params.atmosphere.ground_albedo * saturate(1.0 - field_ground.y));
+}
+
 fn ambient_light(above: f32, below: f32, sky: vec3f, ground: vec3f) -> vec3f {
     return above * ambient_above(sky) + below * ambient_below(ground);
 }

@@ -9,13 +9,17 @@
 #import density
 #import light_field
 
-// Directions: eight corners, up, down, and four along the rows. Quadrature weights in units of 4 pi: they integrate
-// second moments, and the flux of isotropic light through a plane, exactly.
-const DIRECTIONS = 14u;
+// Directions: eight corners, up, down, and eight that are tilted out of the rows. Horizontal directions in place of the
+// tilted would never leave a row of scattered clouds: the fluence between them came out three to ten times too large. The
+// quadrature integrates second moments, and the flux of isotropic light through a plane, exactly. The tilt makes the fourth
+// moment of the vertical exact within 4 %.
+const DIRECTIONS = 18u;
 const CORNERS = 8u;
-const STEEP = 10u; // directions that cross rows
-const AXIS_WEIGHT = 0.0528312;
-const CORNER_WEIGHT = 0.0853766;
+const STEEP = 10u; // corners, up and down
+const TILT = 0.12; // sine of the tilt
+const TILTED_WEIGHT = 0.0378938; // in units of 4 pi
+const AXIS_WEIGHT = 0.0725136;
+const CORNER_WEIGHT = 0.0689778;
 
 fn is_corner(d: u32) -> bool {
     return d < CORNERS;
@@ -26,24 +30,39 @@ fn lattice_step(d: u32) -> vec3i {
     if is_corner(d) {
         return vec3i(i32(d & 1u), i32((d >> 1u) & 1u), i32(d >> 2u)) * 2 - 1;
     }
-    let sign = 1 - 2 * i32(d & 1u);
+    let up = 1 - 2 * i32(d & 1u);
     if d < STEEP {
-        return vec3i(0, 0, sign);
+        return vec3i(0, 0, up);
     }
-    return select(vec3i(0, sign, 0), vec3i(sign, 0, 0), d < 12u);
+    let along = 1 - 2 * i32((d >> 1u) & 1u);
+    return select(vec3i(0, along, up), vec3i(along, 0, up), d < 14u);
 }
 
 // Unit vector of a direction: the same angles in cells of any shape.
 fn lattice_direction(d: u32) -> vec3f {
-    return vec3f(lattice_step(d)) * select(1.0, inverseSqrt(3.0), is_corner(d));
+    let step = vec3f(lattice_step(d));
+    if is_corner(d) {
+        return step * inverseSqrt(3.0);
+    }
+    return select(step * vec3f(vec2f(sqrt(1.0 - TILT * TILT)), TILT), step, d < STEEP);
+}
+
+fn lattice_weight(d: u32) -> f32 {
+    return 4.0 * PI * select(select(TILTED_WEIGHT, AXIS_WEIGHT, d < STEEP), CORNER_WEIGHT, is_corner(d));
+}
+
+// Whether a direction is followed from row to row, in at most one cell per row; else along a row, from cell to cell.
+fn crosses_rows(d: u32) -> bool {
+    return d < STEEP || level.tilt_crosses > 0u;
 }
 
 // Length of a direction's path through a cell, m.
 fn lattice_length(d: u32) -> f32 {
-    if is_corner(d) {
-        return level.cell.z * sqrt(3.0);
+    let direction = abs(lattice_direction(d));
+    if crosses_rows(d) {
+        return level.cell.z / direction.z;
     }
-    return select(select(level.cell.y, level.cell.x, d < 12u), level.cell.z, d < STEEP);
+    return select(level.cell.y / direction.y, level.cell.x / direction.x, direction.x > 0.0);
 }
 
 fn level_size() -> vec3u {
@@ -74,9 +93,9 @@ fn field_density(@builtin(global_invocation_id) id: vec3u) {
         let width = 0.5 * level.cell.z;
         var density = 0.0;
         if VOLUME {
-            density = cloud_density_at(q + frame.sky.volume_low, 0.0, width);
+            density = cloud_density_at(q + frame.sky.volume_low - frame.sky.field_cell, 0.0, width);
         } else {
-            let column = column_on_chart(q.xy, q.z + frame.sky.shell_base);
+            let column = column_on_chart(q.xy, q.z + frame.sky.field_base);
             density = cloud_density(column, cloud_shape(column), width);
         }
         sum += density;
@@ -112,33 +131,26 @@ fn field_depth(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let start = vec3f(id) + 0.5;
-    let cells = vec3f(size);
     let speed = level.sun / level.cell; // cells per metre
-    let step = sun_step();
-    let open = level.sides != SIDES_PERIODIC;
+    let whole = sun_way(start);
+    let way = min(whole, f32(level.sun_steps) * sun_step());
+    let steps = max(ceil(way / sun_step() - 1e-3), 1.0);
+    let step = way / steps;
     var depth = 0.0;
-    var i = 0u;
-    var at = start;
-    var outside = false;
-    // Density beyond a side, of which nothing is known in an open level, is 0.
+    var i = 0.0;
     loop {
-        let t = (f32(i) + 0.5) * step;
-        at = sun_place(start, speed, t);
-        outside = at.z >= cells.z || at.z < 0.0 || (open && any(at.xy < vec2f(0.0)) || open && any(at.xy > cells.xy));
-        depth += select(density_of_level(at), 0.0, outside);
-        i += 1u;
-        if outside || i >= level.sun_steps {
+        depth += density_of_level(sun_place(start, speed, (i + 0.5) * step));
+        i += 1.0;
+        if i >= steps {
             break;
         }
     }
     depth *= frame.sky.extinction * step;
     if level.sides == SIDES_COARSER {
-        let end = sun_place(start, speed, select(f32(i), f32(i) - 1.0, outside) * step);
-        let coarser = coarser_cell(end);
-        let size_there = vec3f(coarser_size());
-        let uvw = level_texel(coarser, size_there);
+        let coarser = coarser_cell(sun_place(start, speed, way));
+        let uvw = level_texel(coarser, vec3f(coarser_size()));
         let beyond = textureSampleLevel(coarser_optics, clamp_sampler, uvw, 0.0).g;
-        depth += select(beyond, 0.0, end.z >= cells.z || end.z < 0.0);
+        depth += select(beyond, 0.0, way >= sun_rise(start.z));
     }
     let texel = textureLoad(level_optics, id, 0);
     textureStore(volume_out, id, vec4f(texel.r, min(depth, MOST_DEPTH), texel.b, 0.0));
@@ -147,74 +159,138 @@ fn field_depth(@builtin(global_invocation_id) id: vec3u) {
 // Largest optical depth that half floats hold with a margin.
 const MOST_DEPTH = 30000.0;
 
-// Length of the sun's path through a cell, along the axis that it crosses fastest, m.
+// Length of the sun's path through a cell along the axis that it crosses fastest, m.
 fn sun_step() -> f32 {
     let speed = abs(level.sun / level.cell);
     return 1.0 / max(max(speed.x, speed.y), speed.z);
 }
 
-// Point on the sun's ray, in cells. The ground falls away below it.
-fn sun_place(start: vec3f, speed: vec3f, t: f32) -> vec3f {
-    let rise = level.bend * (1.0 - level.sun.z * level.sun.z) * t * t / level.cell.z;
-    return start + t * speed + vec3f(0.0, 0.0, rise);
+// Curvature of the ground under the sun's ray, 1/m: the ray rises by this times the square of its length.
+fn sun_bend() -> f32 {
+    return level.bend * (1.0 - level.sun.z * level.sun.z);
 }
 
-// Scaled extinction of each cell, and the scaled sunlight in it: the mean over the cell's path.
+// Point on the sun's ray, in cells.
+fn sun_place(start: vec3f, speed: vec3f, t: f32) -> vec3f {
+    return start + t * speed + vec3f(0.0, 0.0, sun_bend() * t * t / level.cell.z);
+}
+
+// Distance at which the sun's ray from a row leaves the level at the top, or at the base, m.
+fn sun_rise(row: f32) -> f32 {
+    let over = (f32(level.rows) - row) * level.cell.z;
+    let under = row * level.cell.z;
+    let mu = level.sun.z;
+    let bend = sun_bend();
+    if mu < 0.0 {
+        let disc = mu * mu - 4.0 * bend * under;
+        if disc > 0.0 {
+            return 2.0 * under / (sqrt(disc) - mu);
+        }
+        return (sqrt(mu * mu + 4.0 * bend * over) - mu) / max(2.0 * bend, 1e-12);
+    }
+    return 2.0 * over / max(mu + sqrt(mu * mu + 4.0 * bend * over), 1e-6);
+}
+
+// Distance at which the sun's ray leaves the level, m. A periodic level has no sides.
+fn sun_way(start: vec3f) -> f32 {
+    let rise = sun_rise(start.z);
+    let ahead = select(start.xy, vec2f(f32(level.across), f32(level.along)) - start.xy, level.sun.xy > vec2f(0.0));
+    let sides = ahead * level.cell.xy / max(abs(level.sun.xy), vec2f(1e-9));
+    return select(min(rise, min(sides.x, sides.y)), rise, level.sides == SIDES_PERIODIC);
+}
+
+// Scaled extinction of each cell, and the scaled sunlight in it: its mean over the cell, in which the optical depth is
+// linear.
 @compute @workgroup_size(64)
 fn field_beam(@builtin(global_invocation_id) id: vec3u) {
-    let size = level_size();
-    if id.x >= size.x * size.y * size.z {
+    let size = vec3i(level_size());
+    if id.x >= u32(size.x * size.y * size.z) {
         return;
     }
-    let at = vec3u(id.x % size.x, id.x / size.x % size.y, id.x / (size.x * size.y));
+    let at = cell_of(id.x);
     let optics = textureLoad(level_optics, at, 0);
     let scale = frame.sky.split.z;
-    let extinction = scale * frame.sky.extinction * optics.r;
-    let t = min(extinction * sun_step(), 80.0);
-    // exp(-depth) sinh(t / 2) / (t / 2), without overflow.
-    let beam = min(exp(min(0.5 * t - scale * optics.g, 0.0)) * one_minus_exp_over(t), 1.0);
-    deposits[id.x] = vec2f(extinction, select(0.0, beam, level.sunlit > 0u));
+    let beam = exp(-scale * optics.g) * mean_over(scale * depth_across(at, vec3i(1, 0, 0)))
+        * mean_over(scale * depth_across(at, vec3i(0, 1, 0))) * mean_over(scale * depth_across(at, vec3i(0, 0, 1)));
+    deposits[id.x] = vec2f(scale * frame.sky.extinction * optics.r, select(0.0, min(beam, 1.0), level.sunlit > 0u));
 }
 
-// Ratio of the light that the sun loses in the level, by its transmittance at the faces, to what the cells take from it.
+fn cell_of(index: u32) -> vec3i {
+    let size = level_size();
+    return vec3i(vec3u(index % size.x, index / size.x % size.y, index / (size.x * size.y)));
+}
+
+// Difference of the optical depth across a cell along an axis, one-sided at faces.
+fn depth_across(at: vec3i, axis: vec3i) -> f32 {
+    let size = vec3i(level_size());
+    var low = at - axis;
+    var high = at + axis;
+    if level.sides == SIDES_PERIODIC {
+        low = vec3i((low.xy + size.xy) % size.xy, low.z);
+        high = vec3i(high.xy % size.xy, high.z);
+    }
+    low = max(low, vec3i(0));
+    high = min(high, size - 1);
+    let span = select(0.5, 1.0, any(low == at) || any(high == at));
+    return span * (textureLoad(level_optics, high, 0).g - textureLoad(level_optics, low, 0).g);
+}
+
+// Mean of exp(-x) for x from -t / 2 to t / 2: sinh(t / 2) / (t / 2). Bounded, as steps of the depth between cells are no
+// slopes.
+fn mean_over(t: f32) -> f32 {
+    let x = min(abs(t), MOST_STEP);
+    return exp(0.5 * x) * one_minus_exp_over(x);
+}
+
+const MOST_STEP = 6.0;
+
+// Light that the sun loses through the faces of a cell at the faces of the level, by the transmittance there, W per unit
+// of irradiance.
+fn lost_at(at: vec3i, depth: f32, extinction: f32) -> f32 {
+    let size = vec3i(level_size());
+    let area = vec3f(level.cell.y * level.cell.z, level.cell.x * level.cell.z, level.cell.x * level.cell.y);
+    let half_way = 0.5 * extinction * level.cell / max(abs(level.sun), vec3f(1e-3));
+    // What enters has lost less than at the middle of the cell, what leaves more.
+    let before = 1.0 - exp(-max(vec3f(depth) - half_way, vec3f(0.0)));
+    let after = 1.0 - exp(-(vec3f(depth) + half_way));
+    let flux = abs(level.sun) * area;
+    let toward_sun = select(vec3<bool>(at == vec3i(0)), at == size - 1, level.sun > vec3f(0.0));
+    let away = select(at == size - 1, vec3<bool>(at == vec3i(0)), level.sun > vec3f(0.0));
+    var lost = select(vec3f(0.0), flux * after, away) - select(vec3f(0.0), flux * before, toward_sun);
+    if level.sides == SIDES_PERIODIC {
+        lost = vec3f(0.0, 0.0, lost.z);
+    }
+    return lost.x + lost.y + lost.z;
+}
+
 var<workgroup> partial: array<vec2f, 256>;
 
+// Ratio of the light that the sun loses in the level, by its transmittance at the faces, to what the cells take from it.
 @compute @workgroup_size(256)
 fn field_balance(@builtin(local_invocation_id) id: vec3u) {
     let size = level_size();
     let count = size.x * size.y * size.z;
     let volume = level.cell.x * level.cell.y * level.cell.z;
-    let area = vec3f(level.cell.y * level.cell.z, level.cell.x * level.cell.z, level.cell.x * level.cell.y);
     let scale = frame.sky.split.z;
-    var taken = 0.0;
-    var lost = 0.0;
-    for (var i = id.x; i < count; i += 256u) {
-        let deposit = deposits[i];
-        taken += deposit.x * deposit.y * volume;
-        let at = vec3u(i % size.x, i / size.x % size.y, i / (size.x * size.y));
-        for (var axis = 0u; axis < 3u; axis++) {
-            if axis < 2u && level.sides == SIDES_PERIODIC {
-                continue;
-            }
-            let last = at[axis] + 1u == size[axis];
-            if at[axis] == 0u || last {
-                // Of the sun's light through this face the clouds beyond have taken a part.
-                let into = select(-1.0, 1.0, last) * level.sun[axis];
-                let half_way = 0.5 * deposit.x * level.cell[axis] / max(abs(level.sun[axis]), 1e-3);
-                let optics = textureLoad(level_optics, at, 0);
-                let depth = max(scale * optics.g + select(half_way, -half_way, into > 0.0), 0.0);
-                lost -= into * (1.0 - exp(-depth)) * area[axis];
-            }
-        }
+    var sum = vec2f(0.0);
+    let rounds = (count + 255u) / 256u;
+    // The same number of iterations for all threads.
+    for (var round = 0u; round < rounds; round++) {
+        let i = round * 256u + id.x;
+        let index = min(i, count - 1u);
+        let deposit = deposits[index];
+        let at = cell_of(index);
+        let lost = lost_at(at, scale * textureLoad(level_optics, at, 0).g, deposit.x);
+        sum += select(vec2f(0.0), vec2f(deposit.x * deposit.y * volume, lost), i < count);
     }
-    partial[id.x] = vec2f(taken, lost);
+    partial[id.x] = sum;
     workgroupBarrier();
     if id.x == 0u {
-        var sum = vec2f(0.0);
+        var whole = vec2f(0.0);
         for (var i = 0u; i < 256u; i++) {
-            sum += partial[i];
+            whole += partial[i];
         }
-        balance[0] = vec4f(clamp(sum.y / max(sum.x, 1e-20), 0.5, 2.0), sum, 0.0);
+        balance[0] = vec4f(clamp(whole.y / max(whole.x, 1e-20), 0.5, 2.0), whole, 0.0);
     }
 }
 
@@ -243,7 +319,7 @@ fn field_start(@builtin(global_invocation_id) id: vec3u) {
     }
     var moments = Moments(vec4f(0.0), vec4f(0.0));
     if level.coarser_rows > 0u {
-        let at = vec3f(vec3u(id.x % size.x, id.x / size.x % size.y, id.x / (size.x * size.y))) + 0.5;
+        let at = vec3f(cell_of(id.x)) + 0.5;
         let there = coarser_size();
         let corner = interpolation(coarser_cell(at), there);
         for (var i = 0u; i < 8u; i++) {
@@ -298,12 +374,8 @@ fn rim_y(d: u32, at: vec3i) -> u32 {
 
 // Radiance that enters at the top, at the base, or at the sides of an open level: that of the sky from above.
 fn open_radiance(d: u32) -> vec2f {
-    let up = lattice_step(d).z;
-    return vec2f(0.0, select(select(0.0, 1.0, up < 0), HORIZON, up == 0));
+    return vec2f(0.0, select(0.0, 1.0, lattice_step(d).z < 0));
 }
-
-// Radiance of the sky's field along a row without clouds: the horizon, half sky and half ground.
-const HORIZON = 0.5;
 
 // Radiance that enters at the sides: of the coarser level, half a path through a cell before its middle.
 @compute @workgroup_size(64)
@@ -330,7 +402,8 @@ fn field_entering(@builtin(global_invocation_id) id: vec3u) {
         radiance = vec2f(0.0);
         for (var i = 0u; i < 8u; i++) {
             let cells = there.x * there.y * there.z;
-            radiance += corner_weight(corner, i) * coarser_radiances[d * cells + corner_index(corner, i, there.xy)];
+            let other = coarser_radiances[d * cells + corner_index(corner, i, there.xy)];
+            radiance += corner_weight(corner, i) * unpack2x16float(other);
         }
     }
     entering[d * rim_cells() + id.x] = radiance;
@@ -371,7 +444,8 @@ fn source_slope(before: vec2f, here: vec2f, next: vec2f, has_before: bool, has_n
 
 // Cells by which a line that crosses rows has moved after `row` rows: a staircase along the direction.
 fn staircase(row: i32, d: u32) -> vec2i {
-    let shift = select(0.0, level.cell.z, is_corner(d)) / level.cell.xy;
+    let direction = abs(lattice_direction(d));
+    let shift = direction.xy / direction.z * level.cell.z / level.cell.xy;
     return vec2i(floor(shift * f32(row) + 0.5));
 }
 
@@ -379,7 +453,7 @@ fn staircase(row: i32, d: u32) -> vec2i {
 @compute @workgroup_size(32, 2, 1)
 fn field_sweep_down(@builtin(global_invocation_id) id: vec3u) {
     let size = vec3i(level_size());
-    if any(vec3i(id) >= vec3i(size.xy, i32(STEEP))) {
+    if any(vec2i(id.xy) >= size.xy) || id.z >= select(STEEP, DIRECTIONS, level.tilt_crosses > 0u) {
         return;
     }
     let d = id.z;
@@ -406,7 +480,7 @@ fn field_sweep_down(@builtin(global_invocation_id) id: vec3u) {
         let next = source_toward(next_index, direction);
         let slope = source_slope(before, here, next, has_before, !(last || wraps));
         let crossing = cross_cell(deposits[index].x * length, radiance, here, slope);
-        radiances[d * cells + index] = crossing.mean;
+        radiances[d * cells + index] = pack2x16float(crossing.mean);
         radiance = crossing.leaving;
         if open {
             let from_side = entering[select(rim_y(d, next_at), rim_x(d, next_at), next_side.x != side.x)];
@@ -425,15 +499,16 @@ fn field_sweep_down(@builtin(global_invocation_id) id: vec3u) {
     }
 }
 
-// Sweeps the directions along rows: a thread follows a row. In a periodic level it does so twice, as what enters is what
-// leaves.
+// Sweeps the tilted directions in cells that are not flat: a thread follows a line from cell to cell, which changes its
+// row from time to time, and begins anew where it has left the level at the top or at the base. In a periodic level it
+// has gone around before, until it has begun anew.
 @compute @workgroup_size(32, 2, 1)
 fn field_sweep_along(@builtin(global_invocation_id) id: vec3u) {
     let size = vec3i(level_size());
     let d = STEEP + id.z;
     let step = lattice_step(d);
     let in_x = step.x != 0;
-    if id.z >= 4u || i32(id.x) >= select(size.x, size.y, in_x) || i32(id.y) >= size.z {
+    if id.z >= DIRECTIONS - STEEP || i32(id.x) >= select(size.x, size.y, in_x) || i32(id.y) >= size.z {
         return;
     }
     let count = select(size.y, size.x, in_x);
@@ -441,41 +516,56 @@ fn field_sweep_along(@builtin(global_invocation_id) id: vec3u) {
     let length = lattice_length(d);
     let cells = u32(size.x * size.y * size.z);
     let periodic = level.sides == SIDES_PERIODIC;
-    let forward = step.x + step.y > 0;
-    let begin = select(count - 1, 0, forward);
-    let start = select(vec3i(i32(id.x), begin, i32(id.y)), vec3i(begin, i32(id.x), i32(id.y)), in_x);
-    let end = start + step * (count - 1);
-    var radiance = vec2f(0.0);
+    let ahead = step.x + step.y;
+    // Rows by which the line rises from cell to cell.
+    let rise = TILT / sqrt(1.0 - TILT * TILT) * select(level.cell.y, level.cell.x, in_x) / level.cell.z;
+    let rounds = select(1, min(i32(ceil(f32(size.z) / (rise * f32(count)))) + 1, 4), periodic);
+    let first = -(rounds - 1) * count;
+    var m = first;
+    var at = along_line(id.xy, m, count, ahead, step.z, rise, in_x);
+    var floor_of = at.w;
+    var index = cell_index(at.xyz);
+    var radiance = open_radiance(d);
     if !periodic {
-        radiance = entering[select(rim_y(d, start), rim_x(d, start), in_x)];
+        radiance = entering[select(rim_y(d, at.xyz), rim_x(d, at.xyz), in_x)];
     }
-    var before = source_toward(cell_index(end), direction);
-    var here = source_toward(cell_index(start), direction);
-    var depth = 0.0;
-    var m = 0;
-    let turns = select(count, 2 * count, periodic);
+    var before = vec2f(0.0);
+    var here = source_toward(index, direction);
+    var has_before = false;
     loop {
-        let i = m % count;
-        let at = start + step * i;
-        let index = cell_index(at);
-        let next = source_toward(cell_index(select(at + step, start, i + 1 == count)), direction);
-        let slope = source_slope(before, here, next, periodic || i > 0, periodic || i + 1 < count);
-        let t = deposits[index].x * length;
-        let crossing = cross_cell(t, radiance, here, slope);
-        radiances[d * cells + index] = crossing.mean;
-        radiance = crossing.leaving;
-        depth += t;
-        if periodic && m + 1 == count {
-            // The sum over all rounds. A row without clouds has the light of the horizon.
-            radiance = select(vec2f(0.0, HORIZON), radiance / max(1.0 - exp(-depth), 1e-6), depth > 1e-4);
+        let next_at = along_line(id.xy, m + 1, count, ahead, step.z, rise, in_x);
+        let leaves = next_at.w != floor_of;
+        let last = m + 1 >= count;
+        let next_index = cell_index(next_at.xyz);
+        let next = source_toward(next_index, direction);
+        let slope = source_slope(before, here, next, has_before, !(leaves || last));
+        let crossing = cross_cell(deposits[index].x * length, radiance, here, slope);
+        if m >= 0 {
+            radiances[d * cells + index] = pack2x16float(crossing.mean);
         }
+        radiance = select(crossing.leaving, open_radiance(d), leaves);
         before = here;
+        has_before = !leaves;
         here = next;
+        index = next_index;
+        floor_of = next_at.w;
         m += 1;
-        if m >= turns {
+        if m >= count {
             break;
         }
     }
+}
+
+// Cell `m` of a line along a row, and how often the line has left the level at the top or at the base (w). At m = 0 it is at
+// the side in row `line.y`.
+fn along_line(line: vec2u, m: i32, count: i32, ahead: i32, up: i32, rise: f32, in_x: bool) -> vec4i {
+    let rows = i32(level.rows);
+    let turned = ((m % count) + count) % count;
+    let place = select(count - 1 - turned, turned, ahead > 0);
+    let raw = i32(line.y) + up * i32(floor(rise * f32(m) + 0.5));
+    let level_of = i32(floor(f32(raw) / f32(rows)));
+    let row = raw - level_of * rows;
+    return vec4i(select(vec3i(i32(line.x), place, row), vec3i(place, i32(line.x), row), in_x), level_of);
 }
 
 // Moments of a sweep, and the step of Chebyshev's iteration with them.
@@ -488,8 +578,8 @@ fn field_gather(@builtin(global_invocation_id) id: vec3u) {
     }
     var swept = Moments(vec4f(0.0), vec4f(0.0));
     for (var d = 0u; d < DIRECTIONS; d++) {
-        let weight = 4.0 * PI * select(AXIS_WEIGHT, CORNER_WEIGHT, is_corner(d));
-        let radiance = weight * radiances[d * cells + id.x];
+        let weight = lattice_weight(d);
+        let radiance = weight * unpack2x16float(radiances[d * cells + id.x]);
         let moment = vec4f(1.0, lattice_direction(d));
         swept.sun += radiance.x * moment;
         swept.sky += radiance.y * moment;
@@ -543,3 +633,33 @@ fn field_store(@builtin(global_invocation_id) id: vec3u) {
 
 // Fraction of a level's half width from which on it blends into the coarser level.
 const BLEND = 0.8;
+
+var<workgroup> columns: array<vec4f, 256>;
+
+// Means over the level of the light on the ground: `field_ground`.
+@compute @workgroup_size(256)
+fn field_ground_means(@builtin(local_invocation_id) id: vec3u) {
+    let size = level_size();
+    let cells = size.x * size.y * size.z;
+    var sum = vec4f(0.0);
+    for (var i = id.x; i < size.x * size.y; i += 256u) {
+        var down = vec2f(0.0);
+        for (var d = 0u; d < DIRECTIONS; d++) {
+            let weight = lattice_weight(d) * max(-lattice_direction(d).z, 0.0);
+            down += weight * unpack2x16float(radiances[d * cells + i]);
+        }
+        let at = vec3u(i % size.x, i / size.x, 0u);
+        let depth = textureLoad(level_optics, at, 0).g;
+        let direct = exp(-vec2f(frame.sky.split.z, 1.0) * depth) * max(level.sun.z, 0.0);
+        sum += vec4f(direct.x + down.x, down.y / PI, direct.y, max(level.sun.z, 0.0));
+    }
+    columns[id.x] = sum / f32(size.x * size.y);
+    workgroupBarrier();
+    if id.x == 0u {
+        var mean = vec4f(0.0);
+        for (var i = 0u; i < 256u; i++) {
+            mean += columns[i];
+        }
+        ground_out[0] = mean;
+    }
+}

@@ -24,8 +24,11 @@ constants! {
     const SIDES_COARSER: u32 = 2;
 }
 
-/// Directions of the lattice.
-const DIRECTIONS: u64 = 14;
+/// Directions of the lattice, and those of them that are steep or tilted out of the rows.
+const DIRECTIONS: u64 = 18;
+const STEEP: u32 = 10;
+/// Slope of the tilted directions (passes/light_field.wgsl).
+const TILT: f32 = 0.12;
 /// Sweeps of the coarsest grid, of each further grid of the cascade that starts a level, and of the levels from the
 /// second finest and the finest: the error of the fluence by the number of sweeps is in docs/accuracy.md.
 const CASCADE_SWEEPS: [u32; 3] = [16, 10, 8];
@@ -38,15 +41,21 @@ const SUN_CELLS: u32 = 12;
 /// Largest number of cells that it crosses in a level without a coarser one.
 const MOST_SUN_CELLS: f32 = 512.0;
 
+/// Level whose ground lights the clouds: some kilometres, what clouds see of it.
+const GROUND_LEVEL: u32 = 1;
+
 /// Key of the field: shadow casters, light, planet and grid, snapped position and time, shape, whether the sun is up.
 type Key = (Casters, params::Light, (f32, Grid), [i64; 3], FieldShape, bool);
 
 /// Light field on the GPU.
 #[derive(Default)]
 pub(crate) struct LightField {
-    lut: Lut<Key, [wgpu::TextureView; 3]>,
+    lut: Lut<Key, Field>,
     forward: Lut<params::Light>,
 }
+
+/// Textures of optics, of the sun's field and of the sky's field, and the light on the ground.
+type Field = ([wgpu::TextureView; 3], wgpu::Buffer);
 
 /// Grid of cells that is solved, and how its solution is obtained.
 #[derive(Clone, Debug)]
@@ -146,7 +155,7 @@ fn solve(
     let [mut now, mut before] = ["moments", "moments"].map(|label| rec.gpu.buffer(label, 32 * count));
     let sources = rec.gpu.buffer("sources", 32 * count);
     let deposits = rec.gpu.buffer("deposits", 8 * count);
-    let radiances = rec.gpu.buffer("radiances", 8 * DIRECTIONS * count);
+    let radiances = rec.gpu.buffer("radiances", 4 * DIRECTIONS * count);
     let rim = u64::from((stage.cells[0] + stage.cells[1]) * stage.cells[2]);
     let entering = rec.gpu.buffer("entering", 8 * DIRECTIONS * rim);
     let balance = rec.gpu.buffer("balance", 16);
@@ -186,8 +195,12 @@ fn solve(
     };
     rec.dispatch(("light_field", "field_start"), bindings(&level, moments(&now, &before)), [count as u32, 1, 1]);
     for [relaxation, weight] in chebyshev(stage.sweeps) {
-        rec.dispatch(("light_field", "field_sweep_down"), bindings(&level, vec![]), [x, y, 10]);
-        rec.dispatch(("light_field", "field_sweep_along"), bindings(&level, vec![]), [x.max(y), z, 4]);
+        let down = if level.tilt_crosses > 0 { DIRECTIONS as u32 } else { STEEP };
+        rec.dispatch(("light_field", "field_sweep_down"), bindings(&level, vec![]), [x, y, down]);
+        if level.tilt_crosses == 0 {
+            let size = [x.max(y), z, DIRECTIONS as u32 - STEEP];
+            rec.dispatch(("light_field", "field_sweep_along"), bindings(&level, vec![]), size);
+        }
         let step = FieldLevel { relaxation, weight, ..level.clone() };
         rec.dispatch(("light_field", "field_gather"), bindings(&step, moments(&now, &before)), [count as u32, 1, 1]);
         std::mem::swap(&mut now, &mut before);
@@ -224,6 +237,7 @@ fn level_block(stage: &Stage, sun: &Sun, coarser: Option<&Stage>) -> FieldLevel 
         sunlit: sun.is_up.into(),
         bend: sun.bend,
         sun_steps,
+        tilt_crosses: (TILT * stage.cell[0].min(stage.cell[1]) > stage.cell[2]).into(),
         ..FieldLevel::default()
     };
     if let Some(coarser) = coarser {
@@ -249,16 +263,16 @@ impl LightField {
         let lit = frame.sunlit(params);
         let planet = (params.atmosphere.planet_radius, Grid(params.volume.clone()));
         let key = (casters(params), params.light.clone(), planet, field::origin(eye, params, time).steps, shape, lit);
-        let textures = self.lut.update(rec, key, |rec| bake(rec, inputs, &shape, lit))?;
+        let (textures, ground) = self.lut.update(rec, key, |rec| bake(rec, inputs, &shape, lit))?;
         let names = ["field_optics", "field_sun", "field_sky"];
         rec.bind(names.into_iter().zip(textures.iter().map(Binding::from)));
-        rec.bind([("forward_table", (&forward).into())]);
+        rec.bind([("forward_table", (&forward).into()), ("field_ground", (&ground).into())]);
         Ok(())
     }
 }
 
 /// Solves all levels, and stores them in one stack of textures: optics, sun's field, sky's field.
-fn bake(rec: &mut Recorder<'_>, inputs: &Inputs<'_>, shape: &FieldShape, lit: bool) -> Result<[wgpu::TextureView; 3]> {
+fn bake(rec: &mut Recorder<'_>, inputs: &Inputs<'_>, shape: &FieldShape, lit: bool) -> Result<Field> {
     let Inputs { params, eye, time, frame, .. } = *inputs;
     let origin = field::origin(eye, params, time);
     let centre: DVec3 = origin.place.extend(0.0);
@@ -271,6 +285,7 @@ fn bake(rec: &mut Recorder<'_>, inputs: &Inputs<'_>, shape: &FieldShape, lit: bo
     let bindings = there.bindings(rec.gpu).to_vec();
     let whole = [shape.cells[0], shape.cells[1], shape.rows_before(shape.levels)];
     let stacks = ["field_optics", "field_sun", "field_sky"].map(|label| view(&rec.gpu.texture_3d(label, whole)));
+    let ground = rec.gpu.buffer("field_ground", 16);
     let sides = if params.volume.is_some() { SIDES_OPEN } else { SIDES_PERIODIC };
     let mut coarser: Option<Solution> = None;
     for stage in stages(shape, sides) {
@@ -295,11 +310,16 @@ fn bake(rec: &mut Recorder<'_>, inputs: &Inputs<'_>, shape: &FieldShape, lit: bo
                 ("sun_out", sun_out.into()),
                 ("sky_out", sky_out.into()),
             ];
+            if number == GROUND_LEVEL.min(shape.levels - 1) {
+                let more = vec![("radiances", (&solved.radiances).into()), ("ground_out", (&ground).into())];
+                let bindings = [more, own.clone(), bindings.clone()].concat();
+                rec.dispatch(("light_field", "field_ground_means"), bindings, [256, 1, 1]);
+            }
             rec.dispatch(("light_field", "field_store"), [own, bindings.clone()].concat(), solved.stage.cells);
         }
         coarser = Some(solved);
     }
-    Ok(stacks)
+    Ok((stacks, ground))
 }
 
 #[cfg(test)]
@@ -309,7 +329,7 @@ mod tests {
     /// Levels lie in the middle of coarser ones, and the cascade ends at the outermost.
     #[test]
     fn stages_go_from_the_coarsest_to_the_finest() {
-        let shape = FieldShape { cells: [64, 64, 20], cell: [100.0, 100.0, 100.0], levels: 5, halvings: 1 };
+        let shape = FieldShape { cells: [64, 64, 20], cell: [100.0, 100.0, 100.0], base: 0.0, levels: 5, halvings: 1 };
         let stages = stages(&shape, SIDES_PERIODIC);
         let levels: Vec<_> = stages.iter().map(|stage| stage.level).collect();
         assert_eq!(levels, [None, None, None, Some(4), Some(3), Some(2), Some(1), Some(0)]);

@@ -89,13 +89,16 @@ override LIGHT_CHEAP: bool = true; // light samples without detail noise
 @group(0) @binding(88) var<storage, read_write> moments_now: array<vec4f>;
 @group(0) @binding(89) var<storage, read_write> moments_before: array<vec4f>;
 @group(0) @binding(90) var<storage, read_write> coarser_moments: array<vec4f>;
-@group(0) @binding(91) var<storage, read_write> sources: array<vec4f>; // of sun and sky
+// Source functions of sun and sky, written to `sun_out` and `sky_out`. As textures, since lavapipe loads each word of a
+// buffer for each lane by itself.
+@group(0) @binding(91) var sun_sources: texture_3d<f32>;
+@group(0) @binding(101) var sky_sources: texture_3d<f32>;
 @group(0) @binding(92) var<storage, read_write> deposits: array<vec2f>; // scaled extinction, 1/m; scaled sunlight
-// Radiance by direction, of sun and sky: mean in each cell and the same of the coarser level, in pairs of half floats; what
-// enters at the sides.
+// Radiance by direction, of sun and sky: mean in each cell and the same of the coarser level, and what enters at
+// the sides, in pairs of half floats.
 @group(0) @binding(93) var<storage, read_write> radiances: array<u32>;
 @group(0) @binding(94) var<storage, read_write> coarser_radiances: array<u32>;
-@group(0) @binding(95) var<storage, read_write> entering: array<vec2f>;
+@group(0) @binding(95) var<storage, read_write> entering: array<u32>;
 @group(0) @binding(96) var<storage, read_write> balance: array<vec4f>; // factor on the sunlight of all cells
 @group(0) @binding(97) var sun_out: texture_storage_3d<rgba16float, write>;
 @group(0) @binding(98) var sky_out: texture_storage_3d<rgba16float, write>;

@@ -306,8 +306,11 @@ fn write_sources(index: u32, moments: Moments) {
     let turn = 3.0 * frame.sky.turned_cosine;
     let beam = deposits[index].y * balance[0].x;
     let sun = moments.sun + vec4f(beam, -beam * level.sun);
-    sources[2u * index] = c * sun * vec4f(1.0, vec3f(turn));
-    sources[2u * index + 1u] = c * moments.sky * vec4f(1.0, vec3f(turn));
+    let of_sun = c * sun * vec4f(1.0, vec3f(turn));
+    let of_sky = c * moments.sky * vec4f(1.0, vec3f(turn));
+    let at = cell_of(index);
+    textureStore(sun_out, at, of_sun);
+    textureStore(sky_out, at, of_sky);
 }
 
 // Moments to begin with: those of the coarser level, or none.
@@ -406,14 +409,19 @@ fn field_entering(@builtin(global_invocation_id) id: vec3u) {
             radiance += corner_weight(corner, i) * unpack2x16float(other);
         }
     }
-    entering[d * rim_cells() + id.x] = radiance;
+    entering[d * rim_cells() + id.x] = pack2x16float(radiance);
 }
 
 // Source functions of a cell in a direction.
-fn source_toward(index: u32, direction: vec3f) -> vec2f {
-    let sun = sources[2u * index];
-    let sky = sources[2u * index + 1u];
+fn source_toward(at: vec3i, direction: vec3f) -> vec2f {
+    let sun = textureLoad(sun_sources, at, 0);
+    let sky = textureLoad(sky_sources, at, 0);
     return vec2f(sun.x + dot(sun.yzw, direction), sky.x + dot(sky.yzw, direction));
+}
+
+// Scaled optical depth of a path of unit length through a cell, 1/m.
+fn scaled_extinction(at: vec3i) -> f32 {
+    return frame.sky.split.z * frame.sky.extinction * textureLoad(level_optics, at, 0).r;
 }
 
 // Radiance that leaves a cell, and its mean along the path through it. The source is linear along the path, with the
@@ -442,14 +450,8 @@ fn source_slope(before: vec2f, here: vec2f, next: vec2f, has_before: bool, has_n
     return select(select(vec2f(0.0), next - here, has_next), select(here - before, both, has_next), has_before);
 }
 
-// Cells by which a line that crosses rows has moved after `row` rows: a staircase along the direction.
-fn staircase(row: i32, d: u32) -> vec2i {
-    let direction = abs(lattice_direction(d));
-    let shift = direction.xy / direction.z * level.cell.z / level.cell.xy;
-    return vec2i(floor(shift * f32(row) + 0.5));
-}
-
-// Sweeps the directions that cross rows: a thread follows a line from row to row. Every cell lies on one line.
+// Sweeps the directions that cross rows: a thread follows a line from row to row, in a staircase along the direction. Every
+// cell lies on one line.
 @compute @workgroup_size(32, 2, 1)
 fn field_sweep_down(@builtin(global_invocation_id) id: vec3u) {
     let size = vec3i(level_size());
@@ -460,40 +462,42 @@ fn field_sweep_down(@builtin(global_invocation_id) id: vec3u) {
     let step = lattice_step(d);
     let direction = lattice_direction(d);
     let length = lattice_length(d);
-    let cells = u32(size.x * size.y * size.z);
+    let first = d * u32(size.x * size.y * size.z);
     let open = level.sides != SIDES_PERIODIC;
+    // Cells by which the line moves per row.
+    let shift = abs(direction.xy) / abs(direction.z) * level.cell.z / level.cell.xy;
     var radiance = open_radiance(d);
     var at = vec3i(vec2i(id.xy), select(size.z - 1, 0, step.z > 0));
-    var side = vec2i(0); // sides crossed so far
-    var index = cell_index(at);
+    var moved = vec2f(0.0);
     var before = vec2f(0.0);
-    var here = source_toward(index, direction);
+    var here = source_toward(at, direction);
     var has_before = false;
-    var m = 0;
+    var m = 1;
     loop {
-        let raw = vec2i(id.xy) + step.xy * staircase(m + 1, d);
-        let next_side = vec2i(floor(vec2f(raw) / vec2f(size.xy)));
-        let wraps = open && any(next_side != side);
-        let last = m + 1 >= size.z;
-        let next_at = vec3i(raw - next_side * size.xy, select(at.z + step.z, at.z, last));
-        let next_index = cell_index(next_at);
-        let next = source_toward(next_index, direction);
+        let move_to = floor(shift * f32(m) + 0.5);
+        let last = m >= size.z;
+        var next_at = vec3i(at.xy + step.xy * vec2i(move_to - moved), select(at.z + step.z, at.z, last));
+        moved = move_to;
+        let under = next_at.xy < vec2i(0);
+        let over = next_at.xy >= size.xy;
+        next_at = vec3i(next_at.xy + select(vec2i(0), size.xy, under) - select(vec2i(0), size.xy, over), next_at.z);
+        let wraps = open && any(under | over);
+        let next = source_toward(next_at, direction);
         let slope = source_slope(before, here, next, has_before, !(last || wraps));
-        let crossing = cross_cell(deposits[index].x * length, radiance, here, slope);
-        radiances[d * cells + index] = pack2x16float(crossing.mean);
+        let crossing = cross_cell(scaled_extinction(at) * length, radiance, here, slope);
+        radiances[first + cell_index(at)] = pack2x16float(crossing.mean);
         radiance = crossing.leaving;
         if open {
-            let from_side = entering[select(rim_y(d, next_at), rim_x(d, next_at), next_side.x != side.x)];
+            let in_x = under.x || over.x;
+            let from_side = unpack2x16float(entering[select(rim_y(d, next_at), rim_x(d, next_at), in_x)]);
             radiance = select(radiance, from_side, wraps);
         }
         before = here;
         has_before = !wraps;
         here = next;
         at = next_at;
-        index = next_index;
-        side = next_side;
         m += 1;
-        if m >= size.z {
+        if last {
             break;
         }
     }
@@ -514,58 +518,56 @@ fn field_sweep_along(@builtin(global_invocation_id) id: vec3u) {
     let count = select(size.y, size.x, in_x);
     let direction = lattice_direction(d);
     let length = lattice_length(d);
-    let cells = u32(size.x * size.y * size.z);
+    let first = d * u32(size.x * size.y * size.z);
     let periodic = level.sides == SIDES_PERIODIC;
     let ahead = step.x + step.y;
     // Rows by which the line rises from cell to cell.
     let rise = TILT / sqrt(1.0 - TILT * TILT) * select(level.cell.y, level.cell.x, in_x) / level.cell.z;
     let rounds = select(1, min(i32(ceil(f32(size.z) / (rise * f32(count)))) + 1, 4), periodic);
-    let first = -(rounds - 1) * count;
-    var m = first;
-    var at = along_line(id.xy, m, count, ahead, step.z, rise, in_x);
-    var floor_of = at.w;
-    var index = cell_index(at.xyz);
+    var m = (1 - rounds) * count;
+    // The line is in row `id.y` where its last round begins.
+    var risen = floor(rise * f32(m) + 0.5);
+    let turns = floor((f32(id.y) + f32(step.z) * risen) / f32(size.z));
+    var row = i32(id.y) + step.z * i32(risen) - i32(turns) * size.z;
+    var place = select(count - 1, 0, ahead > 0);
+    var at = line_cell(id.x, place, row, in_x);
     var radiance = open_radiance(d);
     if !periodic {
-        radiance = entering[select(rim_y(d, at.xyz), rim_x(d, at.xyz), in_x)];
+        radiance = unpack2x16float(entering[select(rim_y(d, at), rim_x(d, at), in_x)]);
     }
     var before = vec2f(0.0);
-    var here = source_toward(index, direction);
+    var here = source_toward(at, direction);
     var has_before = false;
     loop {
-        let next_at = along_line(id.xy, m + 1, count, ahead, step.z, rise, in_x);
-        let leaves = next_at.w != floor_of;
-        let last = m + 1 >= count;
-        let next_index = cell_index(next_at.xyz);
-        let next = source_toward(next_index, direction);
+        m += 1;
+        let rise_to = floor(rise * f32(m) + 0.5);
+        row += step.z * i32(rise_to - risen);
+        risen = rise_to;
+        let leaves = row < 0 || row >= size.z;
+        row = select(row, row - step.z * size.z, leaves);
+        place += ahead;
+        place = select(place, place - ahead * count, place < 0 || place >= count);
+        let last = m >= count;
+        let next_at = line_cell(id.x, place, row, in_x);
+        let next = source_toward(next_at, direction);
         let slope = source_slope(before, here, next, has_before, !(leaves || last));
-        let crossing = cross_cell(deposits[index].x * length, radiance, here, slope);
-        if m >= 0 {
-            radiances[d * cells + index] = pack2x16float(crossing.mean);
+        let crossing = cross_cell(scaled_extinction(at) * length, radiance, here, slope);
+        if m > 0 {
+            radiances[first + cell_index(at)] = pack2x16float(crossing.mean);
         }
         radiance = select(crossing.leaving, open_radiance(d), leaves);
         before = here;
         has_before = !leaves;
         here = next;
-        index = next_index;
-        floor_of = next_at.w;
-        m += 1;
-        if m >= count {
+        at = next_at;
+        if last {
             break;
         }
     }
 }
 
-// Cell `m` of a line along a row, and how often the line has left the level at the top or at the base (w). At m = 0 it is at
-// the side in row `line.y`.
-fn along_line(line: vec2u, m: i32, count: i32, ahead: i32, up: i32, rise: f32, in_x: bool) -> vec4i {
-    let rows = i32(level.rows);
-    let turned = ((m % count) + count) % count;
-    let place = select(count - 1 - turned, turned, ahead > 0);
-    let raw = i32(line.y) + up * i32(floor(rise * f32(m) + 0.5));
-    let level_of = i32(floor(f32(raw) / f32(rows)));
-    let row = raw - level_of * rows;
-    return vec4i(select(vec3i(i32(line.x), place, row), vec3i(place, i32(line.x), row), in_x), level_of);
+fn line_cell(line: u32, place: i32, row: i32, in_x: bool) -> vec3i {
+    return select(vec3i(i32(line), place, row), vec3i(place, i32(line), row), in_x);
 }
 
 // Moments of a sweep, and the step of Chebyshev's iteration with them.

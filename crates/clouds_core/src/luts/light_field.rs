@@ -145,7 +145,7 @@ struct Sun {
 fn solve(
     rec: &mut Recorder<'_>,
     stage: Stage,
-    sun: &Sun,
+    sky_of: &Sun,
     coarser: Option<&Solution>,
     frame: &Bindings,
     density: impl FnOnce(&mut Recorder<'_>, Bindings, &wgpu::TextureView),
@@ -153,18 +153,18 @@ fn solve(
     let count = stage.count();
     let [densities, optics] = ["densities", "optics"].map(|label| view(&rec.gpu.texture_3d(label, stage.cells)));
     let [mut now, mut before] = ["moments", "moments"].map(|label| rec.gpu.buffer(label, 32 * count));
-    let sources = rec.gpu.buffer("sources", 32 * count);
+    let [sun, sky] = ["sun_sources", "sky_sources"].map(|label| view(&rec.gpu.texture_3d(label, stage.cells)));
     let deposits = rec.gpu.buffer("deposits", 8 * count);
     let radiances = rec.gpu.buffer("radiances", 4 * DIRECTIONS * count);
     let rim = u64::from((stage.cells[0] + stage.cells[1]) * stage.cells[2]);
-    let entering = rec.gpu.buffer("entering", 8 * DIRECTIONS * rim);
+    let entering = rec.gpu.buffer("entering", 4 * DIRECTIONS * rim);
     let balance = rec.gpu.buffer("balance", 16);
-    let level = level_block(&stage, sun, coarser.map(|coarser| &coarser.stage));
+    let level = level_block(&stage, sky_of, coarser.map(|coarser| &coarser.stage));
+    let fallback = now.clone();
     let bindings = |level: &FieldLevel, more: Bindings| -> Bindings {
         let mut bindings = more;
         bindings.extend([
             ("level", uniform(&[level])),
-            ("sources", (&sources).into()),
             ("deposits", (&deposits).into()),
             ("radiances", (&radiances).into()),
             ("entering", (&entering).into()),
@@ -176,7 +176,7 @@ fn solve(
             bindings.push(("coarser_optics", (&coarser.optics).into()));
         } else {
             // Not read without a coarser level.
-            bindings.push(("coarser_moments", (&sources).into()));
+            bindings.push(("coarser_moments", (&fallback).into()));
             bindings.push(("coarser_radiances", (&entering).into()));
         }
         bindings.extend(frame.iter().cloned());
@@ -191,15 +191,20 @@ fn solve(
     rec.dispatch(("light_field", "field_balance"), bindings(&level, optics_in()), [256, 1, 1]);
     rec.dispatch(("light_field", "field_entering"), bindings(&level, vec![]), [rim as u32, DIRECTIONS as u32, 1]);
     let moments = |now: &wgpu::Buffer, before: &wgpu::Buffer| -> Bindings {
-        vec![("moments_now", now.into()), ("moments_before", before.into())]
+        let sources = [("sun_out", (&sun).into()), ("sky_out", (&sky).into())];
+        [vec![("moments_now", now.into()), ("moments_before", before.into())], sources.to_vec()].concat()
+    };
+    let sources = || -> Bindings {
+        let optics = ("level_optics", (&optics).into());
+        vec![("sun_sources", (&sun).into()), ("sky_sources", (&sky).into()), optics]
     };
     rec.dispatch(("light_field", "field_start"), bindings(&level, moments(&now, &before)), [count as u32, 1, 1]);
     for [relaxation, weight] in chebyshev(stage.sweeps) {
         let down = if level.tilt_crosses > 0 { DIRECTIONS as u32 } else { STEEP };
-        rec.dispatch(("light_field", "field_sweep_down"), bindings(&level, vec![]), [x, y, down]);
+        rec.dispatch(("light_field", "field_sweep_down"), bindings(&level, sources()), [x, y, down]);
         if level.tilt_crosses == 0 {
             let size = [x.max(y), z, DIRECTIONS as u32 - STEEP];
-            rec.dispatch(("light_field", "field_sweep_along"), bindings(&level, vec![]), size);
+            rec.dispatch(("light_field", "field_sweep_along"), bindings(&level, sources()), size);
         }
         let step = FieldLevel { relaxation, weight, ..level.clone() };
         rec.dispatch(("light_field", "field_gather"), bindings(&step, moments(&now, &before)), [count as u32, 1, 1]);

@@ -102,10 +102,9 @@ override LIGHT_CHEAP: bool = true; // light samples without detail noise
 @group(0) @binding(96) var<storage, read_write> balance: array<vec4f>; // factor on the sunlight of all cells
 @group(0) @binding(97) var sun_out: texture_storage_3d<rgba16float, write>;
 @group(0) @binding(98) var sky_out: texture_storage_3d<rgba16float, write>;
-// Light on the ground, mean of a level: irradiance of the sun, direct and diffuse, for a sun of irradiance 1; irradiance of
-// a uniform sky over that without clouds; direct part; sine of the sun's elevation.
-@group(0) @binding(99) var<storage, read_write> ground_out: array<vec4f>;
-@group(0) @binding(100) var<uniform> field_ground: vec4f;
+// Light on the ground by place, levels stacked: diffuse irradiance of a sun of irradiance 1; irradiance of a uniform sky
+// relative to that without clouds; scaled and true transmittance toward the sun.
+@group(0) @binding(99) var field_ground: texture_2d<f32>;
 
 // Buffers with an entry for each pixel, row by row. Those of the clouds have an entry for each sample of the sample
 // grid (sample_grid.wgsl).

@@ -254,7 +254,7 @@ fn gathered_radiance(sum: Gathered, nodes: AerialPoints, direction: vec3f) -> ve
         return sun;
     }
     let mu = dot(frame.view.zenith, frame.sky.sun_direction);
-    return sun + ambient_light(sum.above.x, sum.below.x, vec3f(0.0), ground_factor(mu) * sky_light[1].rgb);
+    return sun + ambient_light(sum.above.x, sum.below.x, vec3f(0.0), ground_factor(vec3f(0.0), mu) * sky_light[1].rgb);
 }
 
 fn radiance_through_air(sum: Gathered, nodes: AerialPoints, direction: vec3f) -> vec3f {
@@ -264,7 +264,6 @@ fn radiance_through_air(sum: Gathered, nodes: AerialPoints, direction: vec3f) ->
     var radiance = vec3f(0.0);
     var depth = vec3f(0.0);
     var before = min(way.start, nodes.start);
-    let ground = ground_factor(cos_zenith_at(nodes.start * direction, frame.sky.sun_direction));
     for (var k = 0u; k < 4u; k++) {
         let distance = aerial_point_distance(nodes, f32(k));
         depth += aerial_depth(direction, before, distance, select(PIECES, FIRST_PIECES, k == 0u));
@@ -275,7 +274,7 @@ fn radiance_through_air(sum: Gathered, nodes: AerialPoints, direction: vec3f) ->
         let mu = cos_zenith_at(p, frame.sky.sun_direction);
         var light = sum.sun[k] * sun_irradiance(h, mu);
         if AMBIENT {
-            light += ambient_light(sum.above[k], sum.below[k], light_from_above(h, mu), ground * light_from_below(h, mu));
+            light += ambient_light(sum.above[k], sum.below[k], light_from_above(h, mu), ground_factor(p, mu) * light_from_below(h, mu));
         }
         radiance += air.transmittance * light + sum.weight[k] * air.radiance;
     }

@@ -84,3 +84,14 @@ fn forward_chains(depth: f32, one_minus_mu: f32) -> f32 {
 fn forward_entry(i: vec2u) -> f32 {
     return textureLoad(forward_table, i, 0).r;
 }
+
+// Light on the ground at a place (`field_ground`). It is read where cells are as wide as the clouds' base is high: the
+// directions of the lattice would print copies of narrower gaps.
+fn field_ground_at(q: vec2f) -> vec4f {
+    let across = frame.sky.field_size.x;
+    let wide = ceil(log2(max(frame.sky.field_base / frame.sky.field_cell.x, 1.0)));
+    let which = min(max(field_level(vec3f(q, 0.0)), wide), frame.sky.field_size.w - 1.0);
+    let cell = fract(q / (frame.sky.field_cell.xy * exp2(which) * across) + 0.5) * across;
+    let at = vec2f(cell.x, clamp(cell.y, 0.5, across - 0.5) + which * across);
+    return textureSampleLevel(field_ground, repeat_sampler, at / vec2f(across, across * frame.sky.field_size.w), 0.0);
+}

@@ -3,6 +3,7 @@
 #import math
 #import light
 #import ambient
+#import ground_shadow
 
 // Weight of a sample of optical depth `x` behind a transmittance: the share of the eye's light that it scatters.
 fn sample_weight(transmittance: f32, depth: f32, x: f32) -> f32 {
@@ -39,9 +40,19 @@ fn lit_span(span: Span, p: vec3f, direction: vec3f, turned: Turn) -> Lit {
     return Lit(span.weight, sun, span.above, 1.0 - span.above, span.distance);
 }
 
-// Light of the ground under clouds relative to that of the ground without clouds.
-fn ground_factor(mu: f32) -> vec3f {
+// Light of the ground under a point, relative to that without clouds.
+fn ground_factor(p: vec3f, mu: f32) -> vec3f {
     return vec3f(ground_share());
+}
+
+// Radiance of the ground at a point of it, where the sun has the transmittance `sun` through the clouds.
+fn ground_under(p: vec3f, mu: f32, sun: f32) -> vec3f {
+    return ground_radiance(mu) - (1.0 - sun) * kept_sunlight(mu);
+}
+
+// Reflected sunlight of the ground that clouds may block, part of `ground_radiance`.
+fn kept_sunlight(mu: f32) -> vec3f {
+    return (1.0 - PASSED_ON) * params.atmosphere.ground_albedo / PI * sun_irradiance(0.0, mu) * max(mu, 0.0);
 }
 
 // Ambient light of a sky and a ground of the given radiances.

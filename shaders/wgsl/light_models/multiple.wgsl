@@ -7,6 +7,7 @@
 #import droplets
 #import light
 #import light_field
+#import ground_shadow
 
 const AMBIENT = true;
 
@@ -118,16 +119,34 @@ fn slowest_extinction() -> f32 {
     return frame.sky.split.z;
 }
 
-// Light of the ground under clouds relative to that of the ground without clouds: of the sun's and the sky's light that
-// reaches it, and of what clouds send back.
-fn ground_factor(mu: f32) -> vec3f {
+// Irradiance of a horizontal plane on the ground by sun and sky, where the sun has the transmittance `direct` through the
+// clouds (x: scaled extinction, y: true), over that without clouds. Between the ground and clouds light goes to and fro.
+fn ground_lit(p: vec3f, mu: f32, direct: f32, light: vec4f) -> vec3f {
+    let sun = sun_irradiance(0.0, mu);
+    let sky = PI * light_from_above(0.0, mu);
+    let lit = sun * (max(mu, 0.0) * direct + light.x) + sky * light.y;
+    return lit / (1.0 - params.atmosphere.ground_albedo * saturate(1.0 - light.y));
+}
+
+// Light of the ground under a point, relative to that without clouds.
+fn ground_factor(p: vec3f, mu: f32) -> vec3f {
     if VOLUME {
         return vec3f(1.0);
     }
-    let sun = sun_irradiance(0.0, mu) / max(field_ground.w, 1e-3);
-    let sky = PI * light_from_above(0.0, mu);
-    let mean = (sun * field_ground.x + sky * field_ground.y) / max(sun * field_ground.w + sky, vec3f(1e-30));
-    return mean / (1.0 - params.atmosphere.ground_albedo * saturate(1.0 - field_ground.y));
+    let light = field_ground_at(field_place(p, altitude_at(p)).xy);
+    let clear = sun_irradiance(0.0, mu) * max(mu, 0.0) + PI * light_from_above(0.0, mu);
+    return min(ground_lit(p, mu, light.z, light) / max(clear, vec3f(1e-30)), vec3f(2.0));
+}
+
+// Radiance of the ground at a point of it, where the sun has the true transmittance `sun` through the clouds.
+fn ground_under(p: vec3f, mu: f32, sun: f32) -> vec3f {
+    if VOLUME {
+        let passed = mix(PASSED_ON, 1.0, sun);
+        let light = sun_irradiance(0.0, mu) * max(mu, 0.0) * passed / PI + light_from_above(0.0, mu);
+        return params.atmosphere.ground_albedo * light;
+    }
+    let light = field_ground_at(field_place(p, altitude_at(p)).xy);
+    return params.atmosphere.ground_albedo / PI * ground_lit(p, mu, pow(sun, frame.sky.split.z), light);
 }
 
 fn ambient_light(above: f32, below: f32, sky: vec3f, ground: vec3f) -> vec3f {

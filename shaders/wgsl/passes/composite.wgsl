@@ -519,11 +519,12 @@ fn sight_of(direction: vec3f, corner: vec2f, pixel: vec2u, scene: f32, here: Lay
 
     if ground.enters {
         let p = ground.near * direction;
-        found.background += air.transmittance * ground_radiance(cos_zenith_at(p, frame.sky.sun_direction));
+        let mu = cos_zenith_at(p, frame.sky.sun_direction);
+        let clear = ground_radiance(mu);
+        found.background += air.transmittance * clear;
         if GROUND_SHADOW {
-            let mu = cos_zenith_at(p, frame.sky.sun_direction);
-            found.sunlight = air.transmittance * kept_sunlight(mu);
-            found.shadow = (1.0 - ground_sun(p, mu)) * found.sunlight;
+            found.sunlight = air.transmittance * (clear - ground_under(p, mu, 0.0));
+            found.shadow = air.transmittance * (clear - ground_under(p, mu, ground_sun(p, mu)));
             found.background = max(found.background - found.shadow, vec3f(0.0));
         }
     }
@@ -538,11 +539,6 @@ fn sight_of(direction: vec3f, corner: vec2f, pixel: vec2u, scene: f32, here: Lay
         }
     }
     return found;
-}
-
-// Reflected sunlight of the ground that clouds may block, part of `ground_radiance`.
-fn kept_sunlight(mu: f32) -> vec3f {
-    return (1.0 - PASSED_ON) * params.atmosphere.ground_albedo / PI * sun_irradiance(0.0, mu) * max(mu, 0.0);
 }
 
 // Transmittance of all clouds toward the sun at a point of the ground.

@@ -636,32 +636,39 @@ fn field_store(@builtin(global_invocation_id) id: vec3u) {
 // Fraction of a level's half width from which on it blends into the coarser level.
 const BLEND = 0.8;
 
-var<workgroup> columns: array<vec4f, 256>;
-
-// Means over the level of the light on the ground: `field_ground`.
-@compute @workgroup_size(256)
-fn field_ground_means(@builtin(local_invocation_id) id: vec3u) {
+// Light on the ground under a level: `field_ground`. The radiance of each direction that leaves the lowest row meets the
+// ground beside it.
+@compute @workgroup_size(8, 8)
+fn field_ground_bake(@builtin(global_invocation_id) id: vec3u) {
     let size = level_size();
+    if any(id.xy >= size.xy) {
+        return;
+    }
     let cells = size.x * size.y * size.z;
-    var sum = vec4f(0.0);
-    for (var i = id.x; i < size.x * size.y; i += 256u) {
-        var down = vec2f(0.0);
-        for (var d = 0u; d < DIRECTIONS; d++) {
-            let weight = lattice_weight(d) * max(-lattice_direction(d).z, 0.0);
-            down += weight * unpack2x16float(radiances[d * cells + i]);
+    var sun = 0.0;
+    var sky = 0.0;
+    for (var d = 0u; d < DIRECTIONS; d++) {
+        let direction = lattice_direction(d);
+        if direction.z < 0.0 {
+            // Beyond the sides the level repeats.
+            let beside = frame.sky.field_base * direction.xy / direction.z / level.cell.xy;
+            let at = fract((vec2f(id.xy) + 0.5 + beside) / vec2f(size.xy)) * vec2f(size.xy);
+            let corner = interpolation(vec3f(at, 0.5), size);
+            var radiance = vec2f(0.0);
+            for (var i = 0u; i < 4u; i++) {
+                let index = d * cells + corner_index(corner, i, size.xy);
+                radiance += corner_weight(corner, i) * unpack2x16float(radiances[index]);
+            }
+            sun -= lattice_weight(d) * direction.z * radiance.x;
+            sky -= lattice_weight(d) * direction.z * radiance.y;
         }
-        let at = vec3u(i % size.x, i / size.x, 0u);
-        let depth = textureLoad(level_optics, at, 0).g;
-        let direct = exp(-vec2f(frame.sky.split.z, 1.0) * depth) * max(level.sun.z, 0.0);
-        sum += vec4f(direct.x + down.x, down.y / PI, direct.y, max(level.sun.z, 0.0));
     }
-    columns[id.x] = sum / f32(size.x * size.y);
-    workgroupBarrier();
-    if id.x == 0u {
-        var mean = vec4f(0.0);
-        for (var i = 0u; i < 256u; i++) {
-            mean += columns[i];
-        }
-        ground_out[0] = mean;
-    }
+    // The sun's light, straight from the lowest row.
+    let mu = max(level.sun.z, 1e-3);
+    let beside = frame.sky.field_base * level.sun.xy / mu / level.cell.xy;
+    let at = fract((vec2f(id.xy) + 0.5 + beside) / vec2f(size.xy)) * vec2f(size.xy);
+    let depth = textureSampleLevel(level_optics, repeat_sampler, level_texel(vec3f(at, 0.5), vec3f(size)), 0.0).g;
+    let direct = exp(-vec2f(frame.sky.split.z, 1.0) * depth);
+    let out = vec2u(id.x, level.first_row + id.y);
+    textureStore(map_out, out, vec4f(sun, sky / PI, direct));
 }

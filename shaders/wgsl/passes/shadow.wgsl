@@ -13,7 +13,7 @@ const GROUND_STEPS = 48.0;
 const FEWEST = 12.0;
 // Largest number of sun rays per texel of the ground.
 const MOST_PLACES = 16.0;
-// Optical depth beyond which less than a thousandth of the sunlight remains.
+// Scaled optical depth beyond which less than a thousandth of the sunlight remains.
 const DARK = 7.0;
 
 @compute @workgroup_size(GRID_GROUP, GRID_GROUP)
@@ -135,7 +135,7 @@ fn cloud_depth_to_sun(p: vec3f, fine: f32, most: f32) -> vec4f {
         let above = vec4f(height_among_clouds(q, altitude_at(q))) >= vec4f(-1e30, 0.25, 0.5, 0.75);
         let here = frame.sky.extinction * step * cloud_density(column, cloud_shape(column), 0.0);
         depth += select(vec4f(0.0), vec4f(here), above);
-        if i >= count || depth.x > DARK {
+        if i >= count || frame.sky.split.z * depth.x > DARK {
             break;
         }
     }

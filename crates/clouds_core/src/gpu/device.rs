@@ -76,10 +76,10 @@ fn spawn_waiter(device: wgpu::Device) -> mpsc::Sender<WaitRequest> {
 fn required_limits(adapter: &wgpu::Adapter) -> wgpu::Limits {
     let offered = adapter.limits();
     // Limits that the code needs and no more, except for the largest possible buffers: they bound the size of
-    // `animate`'s frames. `march` binds up to 20 textures; Vulkan guarantees 16, drivers have 96 and more. `reproject` binds
+    // `animate`'s frames. `march` binds up to 22 textures; Vulkan guarantees 16, drivers have 96 and more. `reproject` binds
     // 10 storage buffers; Vulkan guarantees 4, desktop drivers have 16 and more.
     wgpu::Limits {
-        max_sampled_textures_per_shader_stage: 20,
+        max_sampled_textures_per_shader_stage: 22,
         max_storage_buffers_per_shader_stage: 10,
         max_buffer_size: offered.max_buffer_size,
         max_storage_buffer_binding_size: offered.max_storage_buffer_binding_size,

@@ -41,9 +41,6 @@ const SUN_CELLS: u32 = 12;
 /// Largest number of cells that it crosses in a level without a coarser one.
 const MOST_SUN_CELLS: f32 = 512.0;
 
-/// Level whose ground lights the clouds: some kilometres, what clouds see of it.
-const GROUND_LEVEL: u32 = 1;
-
 /// Key of the field: shadow casters, light, planet and grid, snapped position and time, shape, whether the sun is up.
 type Key = (Casters, params::Light, (f32, Grid), [i64; 3], FieldShape, bool);
 
@@ -55,7 +52,7 @@ pub(crate) struct LightField {
 }
 
 /// Textures of optics, of the sun's field and of the sky's field, and the light on the ground.
-type Field = ([wgpu::TextureView; 3], wgpu::Buffer);
+type Field = ([wgpu::TextureView; 3], wgpu::TextureView);
 
 /// Grid of cells that is solved, and how its solution is obtained.
 #[derive(Clone, Debug)]
@@ -290,7 +287,7 @@ fn bake(rec: &mut Recorder<'_>, inputs: &Inputs<'_>, shape: &FieldShape, lit: bo
     let bindings = there.bindings(rec.gpu).to_vec();
     let whole = [shape.cells[0], shape.cells[1], shape.rows_before(shape.levels)];
     let stacks = ["field_optics", "field_sun", "field_sky"].map(|label| view(&rec.gpu.texture_3d(label, whole)));
-    let ground = rec.gpu.buffer("field_ground", 16);
+    let ground = view(&rec.gpu.texture("field_ground", [shape.cells[0], shape.cells[1] * shape.levels, 1], 1));
     let sides = if params.volume.is_some() { SIDES_OPEN } else { SIDES_PERIODIC };
     let mut coarser: Option<Solution> = None;
     for stage in stages(shape, sides) {
@@ -315,10 +312,15 @@ fn bake(rec: &mut Recorder<'_>, inputs: &Inputs<'_>, shape: &FieldShape, lit: bo
                 ("sun_out", sun_out.into()),
                 ("sky_out", sky_out.into()),
             ];
-            if number == GROUND_LEVEL.min(shape.levels - 1) {
-                let more = vec![("radiances", (&solved.radiances).into()), ("ground_out", (&ground).into())];
+            if sides == SIDES_PERIODIC {
+                let rows = FieldLevel { first_row: number * shape.cells[1], ..level.clone() };
+                let more = vec![
+                    ("level", uniform(&[&rows])),
+                    ("radiances", (&solved.radiances).into()),
+                    ("map_out", (&ground).into()),
+                ];
                 let bindings = [more, own.clone(), bindings.clone()].concat();
-                rec.dispatch(("light_field", "field_ground_means"), bindings, [256, 1, 1]);
+                rec.dispatch(("light_field", "field_ground_bake"), bindings, [size[0], size[1], 1]);
             }
             rec.dispatch(("light_field", "field_store"), [own, bindings.clone()].concat(), solved.stage.cells);
         }

@@ -265,6 +265,25 @@ class Renderer:
         eye: tuple[float, float, float],
         time: float,
     ) -> npt.NDArray[np.float32]: ...
+    def solve_light(
+        self,
+        extinction: npt.NDArray[np.float32],
+        cell: tuple[float, float, float],
+        sun: tuple[float, float, float],
+        how: tuple[bool, int],
+        params: Params,
+    ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32], float]:
+        """Light field of given cells: moments (8) and deposits (2) of each, factor on the sun."""
+
+    def irradiance(
+        self,
+        points: npt.ArrayLike,
+        normal: tuple[float, float, float],
+        params: Params,
+        time: float,
+    ) -> npt.NDArray[np.float32]:
+        """Direct and diffuse irradiance at points, shape (N, 2, 3)."""
+
     def counters(self) -> list[int]:
         """Numbers of submissions to the device and of waits for them so far."""
 

@@ -497,6 +497,54 @@ class Renderer:
         _check_params(params)
         return self._core.sun_transmittance(points, params, _time(time))
 
+    def irradiance(
+        self,
+        points: npt.ArrayLike,
+        params: Params,
+        *,
+        normal: npt.ArrayLike = (0.0, 0.0, 1.0),
+        time: float = 0.0,
+    ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
+        """Return the irradiance of planes at points, by the light field.
+
+        The sum of both parts is the global irradiance; for a horizontal plane, the direct part
+        is the direct normal irradiance times the sine of the sun's elevation.
+
+        Parameters
+        ----------
+        points : array-like, shape (N, 3)
+            Positions in world metres.
+        params : Params
+            Its light model is ``"multiple"``.
+        normal : array-like of three numbers
+            Normal of the planes, of any length.
+        time : float
+            Time in seconds.
+
+        Returns
+        -------
+        direct, diffuse : array of float32, shape (N, 3)
+            Irradiance of the sun, straight from it through clouds and air, and of all other
+            light: of clouds, sky and ground. Rec. 709, in the units of ``sun.irradiance``. Light
+            that high clouds scatter is not part of it.
+
+        Raises
+        ------
+        ParameterError
+            For an argument that is not allowed, and for a light model without a light field.
+
+        Examples
+        --------
+        >>> direct, diffuse = renderer.irradiance([(0, 0, 0)], params)
+        """
+        _check_params(params)
+        allowed = "three numbers, not all 0"
+        across = numbers("normal", normal, allowed, shapes=[(3,)], dtype=np.float64)
+        if not np.any(across):
+            raise ParameterError(f"normal = {normal!r}: allowed is {allowed}")
+        answers = self._core.irradiance(points, tuple(across.tolist()), params, _time(time))
+        return answers[:, 0], answers[:, 1]
+
     def shadow_map(
         self,
         params: Params,

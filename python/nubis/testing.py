@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from nubis._arrays import numbers
 from nubis._renderer import Renderer
-from nubis.params import Params, Quality
+from nubis.params import Light, Params, Quality
 
 
 def probe(
@@ -63,3 +63,47 @@ def probe(
     renderer = Renderer(1, 1, quality=quality)
     given_params = params or Params()
     return renderer._core.probe(list(imports), expression, full.tolist(), given_params, eye, time)
+
+
+def solve_light(
+    extinction: npt.ArrayLike,
+    cell: tuple[float, float, float],
+    sun: tuple[float, float, float],
+    *,
+    periodic: bool = True,
+    sweeps: int = 100,
+    params: Params | None = None,
+) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32], npt.NDArray[np.float32], float]:
+    """Return the light field of one level of cells, solved from no light.
+
+    Parameters
+    ----------
+    extinction : array-like, shape (nz, ny, nx)
+        Extinction of each cell in 1/m.
+    cell : three floats
+        Size of a cell along x, y and z in m.
+    sun : three floats
+        Unit vector toward the sun.
+    periodic : bool
+        Whether the cells repeat in x and y; otherwise skylight alone enters at the sides.
+    sweeps : int
+        Number of sweeps.
+    params : Params, optional
+        Phase function and albedo.
+
+    Returns
+    -------
+    of_sun, of_sky : array of float32, shape (4, nz, ny, nx)
+        Fluence and flux of light that has turned, for a sun of irradiance 1 and for a uniform sky
+        of radiance 1.
+    deposits : array of float32, shape (2, nz, ny, nx)
+        Scaled extinction in 1/m, and scaled sunlight.
+    factor : float
+        Factor on the scaled sunlight that balances what the cells take from the sun.
+    """
+    cells = np.ascontiguousarray(extinction, np.float32)
+    given = params or Params(light=Light(model="multiple"))
+    core = Renderer(1, 1)._core
+    moments, deposits, factor = core.solve_light(cells, cell, sun, (periodic, sweeps), given)
+    of_sun, of_sky = np.moveaxis(moments, -1, 0).reshape(2, 4, *cells.shape)
+    return of_sun, of_sky, np.moveaxis(deposits, -1, 0), factor

@@ -42,6 +42,7 @@ pub mod wind;
 
 pub use camera::Camera;
 pub use error::{Error, Result};
+pub use luts::light_field::Cells;
 pub use gpu::{AdapterInfo, Gpu, adapters, disk_cache as cache};
 pub use params::{Params, Quality};
 pub use passes::display::Screen;

@@ -11,8 +11,11 @@ use crate::gpu::Linked;
 use crate::gpu::{Interrupt, Timings, check_fork};
 use crate::gpu::{Program, Specialization};
 use crate::gpu::{Recorder, Which};
+use crate::luts::light_field::{Cells, solve_cells};
+use crate::luts::lut::params_block;
 use crate::luts::{Inputs, shadow};
-use crate::params::Params;
+use crate::params::{Model, Params};
+use crate::schema::Typed as _;
 use crate::passes::points;
 use crate::renderer::Renderer;
 use crate::shot::Shot;
@@ -172,6 +175,54 @@ impl Renderer {
         // A single dispatch, so that timed probes fill the device.
         let kernel = Which::Made(Arc::new(kernel));
         self.run_points(&kernel, &Shot::new(&camera, params, time), inputs, 1 << 20, interrupt)
+    }
+
+    /// Light field of given cells, solved from no light by a number of sweeps, with the phase function and the albedo of
+    /// `params`: fluence and flux of the sun's light and of the sky's, eight numbers per cell; scaled extinction in 1/m
+    /// and scaled sunlight, two per cell; factor on the scaled sunlight. Tests call it.
+    pub fn solve_light(
+        &mut self,
+        cells: &Cells<'_>,
+        params: &Params,
+        interrupt: Interrupt<'_>,
+    ) -> Result<(Vec<f32>, Vec<f32>, f32)> {
+        check_fork()?;
+        self.timings = Timings::default();
+        let mut rec = Recorder::new(&self.gpu, &mut self.timings, interrupt);
+        rec.bind([("params", params_block(params, &self.quality))]);
+        rec.specialize(specialization::of_points(params, &self.quality));
+        solve_cells(&mut rec, cells, params)?;
+        let downloads = rec.submit()?;
+        let [moments, deposits, balance] = [0, 1, 2].map(|i| downloads[i].numbers::<f32>().to_vec());
+        Ok((moments, deposits, balance[0]))
+    }
+
+    /// Irradiance at world points in m on planes with a normal, by the light field: eight numbers per point, those of the
+    /// sun's light that comes straight from it (three), those of all other light (three), and two without meaning.
+    ///
+    /// Returns [`Error::Parameter`] for a light model without a light field.
+    pub fn irradiance(
+        &mut self,
+        at: &[[f64; 3]],
+        normal: [f64; 3],
+        params: &Params,
+        time: f64,
+        interrupt: Interrupt<'_>,
+    ) -> Result<Vec<[[f32; 4]; 2]>> {
+        check_fork()?;
+        if params.light.model != Model::Multiple {
+            let allowed = "'multiple', whose light field has the irradiance";
+            return Err(Error::parameter("light.model", params.light.model.to_value(), allowed));
+        }
+        let Some(first) = at.first() else { return Ok(Vec::new()) };
+        let eye = DVec3::from_array(*first);
+        let camera = Camera::equirect(eye)?;
+        let normal = DVec3::from_array(normal).normalize().as_vec3().extend(0.0).to_array();
+        let offset = |p: &[f64; 3]| (DVec3::from_array(*p) - eye).as_vec3().extend(0.0).to_array();
+        let points: Vec<_> = at.iter().flat_map(|p| [offset(p), normal]).collect();
+        let kernel = Which::Named(("irradiance", "irradiance_at_points"), self.points_specialization(params));
+        let answers = self.run_points(&kernel, &Shot::new(&camera, params, time), &points, points::CHUNK, interrupt)?;
+        Ok(answers.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect())
     }
 
     fn run_points(

@@ -16,9 +16,9 @@ use clouds_core::renderer::Renderer as CoreRenderer;
 use clouds_core::scene_depth::SceneDepth;
 use clouds_core::schema::Value;
 use clouds_core::wind::{Advection, Between, NUMBERS};
-use clouds_core::{DensityGrid as CoreGrid, Error, Result, cache, color, files, params, schema};
+use clouds_core::{Cells, DensityGrid as CoreGrid, Error, Result, cache, color, files, params, schema};
 use glam::DVec3;
-use numpy::{PyArray1, PyArrayMethods as _, PyReadonlyArrayDyn, PyUntypedArrayMethods as _};
+use numpy::{PyArray1, PyArrayMethods as _, PyReadonlyArray3, PyReadonlyArrayDyn, PyUntypedArrayMethods as _};
 use pyo3::prelude::*;
 use pyo3::types::{IntoPyDict as _, PyDict, PyString, PyTuple};
 
@@ -592,6 +592,50 @@ impl Renderer {
         })?;
         let count = answers.len();
         array(py, answers.into_flattened(), &[count, 4])
+    }
+
+    /// Light field of given cells: moments of each cell (8), scaled extinction and sunlight of each cell (2), factor on the
+    /// sunlight.
+    #[expect(clippy::type_complexity, reason = "the arrays of a test")]
+    fn solve_light<'py>(
+        &self,
+        extinction: PyReadonlyArray3<'py, f32>,
+        cell: [f32; 3],
+        sun: [f32; 3],
+        how: (bool, u32),
+        params: &Bound<'py, PyAny>,
+    ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>, f32)> {
+        let py = params.py();
+        let _inside = exit::enter(py);
+        let params: Params = params_from_python(params)?;
+        let [z, y, x]: [usize; 3] = extinction.shape().try_into().expect("three axes");
+        let size = [x as u32, y as u32, z as u32];
+        let extinction = extinction.as_slice()?.to_vec();
+        let (periodic, sweeps) = how;
+        let (moments, deposits, factor) = detached(py, |interrupt| {
+            let cells = Cells { extinction: &extinction, size, cell, sun, periodic, sweeps };
+            lock(&self.core).solve_light(&cells, &params, interrupt)
+        })?;
+        Ok((array(py, moments, &[z, y, x, 8])?, array(py, deposits, &[z, y, x, 2])?, factor))
+    }
+
+    /// Irradiance at points on planes with a normal: direct and diffuse, shape (N, 2, 3).
+    fn irradiance<'py>(
+        &self,
+        points: &Bound<'py, PyAny>,
+        normal: [f64; 3],
+        params: &Bound<'py, PyAny>,
+        time: f64,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let py = params.py();
+        let _inside = exit::enter(py);
+        let points = points_from_python(py, points)?;
+        let params: Params = params_from_python(params)?;
+        let answers =
+            detached(py, |interrupt| lock(&self.core).irradiance(&points, normal, &params, time, interrupt))?;
+        let count = answers.len();
+        let numbers = answers.into_iter().flatten().flat_map(|[r, g, b, _]| [r, g, b]).collect();
+        array(py, numbers, &[count, 2, 3])
     }
 
     /// Numbers of submissions to the device and of waits for them so far.

@@ -71,6 +71,8 @@ struct Solution {
     optics: wgpu::TextureView,
     moments: wgpu::Buffer,
     radiances: wgpu::Buffer,
+    deposits: wgpu::Buffer,
+    balance: wgpu::Buffer,
 }
 
 impl Stage {
@@ -138,17 +140,25 @@ struct Sun {
     bend: f32,
 }
 
-/// Solves a stage. `density` records the bake of the densities into a texture.
+/// Densities of a stage.
+enum Densities {
+    /// Baked from the clouds.
+    Baked,
+    /// Given as a texture.
+    Given(wgpu::TextureView),
+}
+
+/// Solves a stage.
 fn solve(
     rec: &mut Recorder<'_>,
     stage: Stage,
     sky_of: &Sun,
     coarser: Option<&Solution>,
     frame: &Bindings,
-    density: impl FnOnce(&mut Recorder<'_>, Bindings, &wgpu::TextureView),
+    densities: Densities,
 ) -> Solution {
     let count = stage.count();
-    let [densities, optics] = ["densities", "optics"].map(|label| view(&rec.gpu.texture_3d(label, stage.cells)));
+    let optics = view(&rec.gpu.texture_3d("optics", stage.cells));
     let [mut now, mut before] = ["moments", "moments"].map(|label| rec.gpu.buffer(label, 32 * count));
     let [sun, sky] = ["sun_sources", "sky_sources"].map(|label| view(&rec.gpu.texture_3d(label, stage.cells)));
     let deposits = rec.gpu.buffer("deposits", 8 * count);
@@ -180,7 +190,15 @@ fn solve(
         bindings
     };
     let [x, y, z] = stage.cells;
-    density(rec, bindings(&level, vec![]), &densities);
+    let densities = match densities {
+        Densities::Given(densities) => densities,
+        Densities::Baked => {
+            let densities = view(&rec.gpu.texture_3d("densities", stage.cells));
+            let out = vec![("volume_out", (&densities).into())];
+            rec.dispatch(("light_field", "field_density"), bindings(&level, out), stage.cells);
+            densities
+        }
+    };
     let own: Bindings = vec![("level_optics", (&densities).into()), ("volume_out", (&optics).into())];
     rec.dispatch(("light_field", "field_depth"), bindings(&level, own), stage.cells);
     let optics_in = || vec![("level_optics", Binding::from(&optics))];
@@ -207,7 +225,7 @@ fn solve(
         rec.dispatch(("light_field", "field_gather"), bindings(&step, moments(&now, &before)), [count as u32, 1, 1]);
         std::mem::swap(&mut now, &mut before);
     }
-    Solution { stage, optics, moments: now, radiances }
+    Solution { stage, optics, moments: now, radiances, deposits, balance }
 }
 
 /// Uniform block of a stage.
@@ -292,11 +310,7 @@ fn bake(rec: &mut Recorder<'_>, inputs: &Inputs<'_>, shape: &FieldShape, lit: bo
     let mut coarser: Option<Solution> = None;
     for stage in stages(shape, sides) {
         let size = stage.cells;
-        let density = |rec: &mut Recorder<'_>, mut given: Bindings, out: &wgpu::TextureView| {
-            given.insert(0, ("volume_out", out.into()));
-            rec.dispatch(("light_field", "field_density"), given, size);
-        };
-        let solved = solve(rec, stage, &sun, coarser.as_ref(), &bindings, density);
+        let solved = solve(rec, stage, &sun, coarser.as_ref(), &bindings, Densities::Baked);
         if let Some(number) = solved.stage.level {
             let mut level = level_block(&solved.stage, &sun, coarser.as_ref().map(|coarser| &coarser.stage));
             level.first_row = shape.rows_before(number);
@@ -327,6 +341,41 @@ fn bake(rec: &mut Recorder<'_>, inputs: &Inputs<'_>, shape: &FieldShape, lit: bo
         coarser = Some(solved);
     }
     Ok((stacks, ground))
+}
+
+/// Cells of given extinctions for [`solve_cells`].
+pub struct Cells<'a> {
+    /// Extinction of each cell in 1/m, x first.
+    pub extinction: &'a [f32],
+    /// Number of cells along each axis.
+    pub size: [u32; 3],
+    /// Cell in m.
+    pub cell: [f32; 3],
+    /// Unit vector toward the sun.
+    pub sun: [f32; 3],
+    /// Whether the cells repeat in x and y. Otherwise nothing but skylight enters at the sides.
+    pub periodic: bool,
+    /// Number of sweeps.
+    pub sweeps: u32,
+}
+
+/// Solves the light field of given cells, from no light, for tests. Records readbacks of fluence and flux of the sun's
+/// light and of the sky's (eight numbers per cell), and of scaled extinction and scaled sunlight (two).
+pub(crate) fn solve_cells(rec: &mut Recorder<'_>, cells: &Cells<'_>, params: &params::Params) -> Result<()> {
+    let mut frame = Frame::new(&Camera::equirect(DVec3::ZERO)?, params, 0.0, [1, 1]);
+    frame.sky.extinction = 1.0;
+    let bindings = frame.bindings(rec.gpu).to_vec();
+    let sides = if cells.periodic { SIDES_PERIODIC } else { SIDES_OPEN };
+    let stage = Stage { cells: cells.size, cell: cells.cell, sides, sweeps: cells.sweeps, level: None };
+    let sun = Sun { toward: cells.sun, is_up: true, bend: 0.0 };
+    let densities = rec.gpu.texture_3d("densities", cells.size);
+    let texel = |v: &f32| [half::f16::from_f32(*v), half::f16::ZERO, half::f16::ZERO, half::f16::ZERO];
+    rec.gpu.write_texture(&densities, &cells.extinction.iter().map(texel).collect::<Vec<_>>());
+    let solved = solve(rec, stage, &sun, None, &bindings, Densities::Given(view(&densities)));
+    rec.download(&solved.moments, 0, solved.moments.size());
+    rec.download(&solved.deposits, 0, solved.deposits.size());
+    rec.download(&solved.balance, 0, solved.balance.size());
+    Ok(())
 }
 
 #[cfg(test)]

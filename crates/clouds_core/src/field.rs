@@ -23,13 +23,13 @@ pub(crate) struct FieldShape {
 
 /// Smallest number of rows of a level of clouds: with fewer, light below a deck of 400 m is 12 to 41 % too bright
 /// (docs/accuracy.md).
-const LEAST_ROWS: u32 = 10;
+const LEAST_ROWS: u32 = 20;
 /// Largest number of rows.
 const MOST_ROWS: u32 = 64;
 /// Largest number of cells of a grid's level: its radiances, of 72 bytes per cell, fit a buffer of 128 MiB.
 const MOST_CELLS: f32 = 1.5e6;
 /// Half width of the coarsest level of clouds, m: clouds beyond hide behind nearer ones.
-const REACH: f32 = 75_000.0;
+const REACH: f32 = 50_000.0;
 /// Displacement of the clouds in m up to which the field is reused. A power of two (clipmap.rs).
 const CLOUD_STEP: f64 = 64.0;
 

@@ -38,9 +38,17 @@ impl Quality {
                 min_transmittance: 0.002,
                 adaptive_threshold: 0.0,
                 path_samples: 256,
+                field_cells: 96,
+                field_cell: 50.0,
                 ..balanced
             },
-            "reference" => Self { integrator: Integrator::Reference, path_samples: 1024, ..balanced },
+            "reference" => Self {
+                integrator: Integrator::Reference,
+                path_samples: 1024,
+                field_cells: 96,
+                field_cell: 50.0,
+                ..balanced
+            },
             _ => {
                 return published::quality(name).ok_or_else(|| {
                     Error::parameter("quality", format!("{name:?}"), format!("one of {:?}", Self::NAMES))
@@ -71,7 +79,8 @@ impl Quality {
         if self.integrator != Integrator::Path || matches!(model, Model::Octaves | Model::Multiple | Model::Path) {
             return Ok(());
         }
-        let allowed = "'multiple' or 'octaves' with quality.integrator = 'path', which traces every order of scattering";
+        let allowed =
+            "'multiple' or 'octaves' with quality.integrator = 'path', which traces every order of scattering";
         Err(Error::parameter("light.model", model.to_value(), allowed))
     }
 

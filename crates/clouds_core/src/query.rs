@@ -15,9 +15,9 @@ use crate::luts::light_field::{Cells, solve_cells};
 use crate::luts::lut::params_block;
 use crate::luts::{Inputs, shadow};
 use crate::params::{Model, Params};
-use crate::schema::Typed as _;
 use crate::passes::points;
 use crate::renderer::Renderer;
+use crate::schema::Typed as _;
 use crate::shot::Shot;
 use crate::specialization;
 

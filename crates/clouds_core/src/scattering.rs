@@ -216,7 +216,8 @@ mod tests {
         assert!((moments[0] - 1.0).abs() < 1e-6);
         let [g, body, alpha, weight] = droplet(f64::from(Light::default().droplet_diameter));
         // Mean cosine of Draine's function in closed form.
-        let mean = body * (1.0 + alpha * (3.0 + 2.0 * body * body) / 5.0) / (1.0 + alpha * (1.0 + 2.0 * body * body) / 3.0);
+        let mean =
+            body * (1.0 + alpha * (3.0 + 2.0 * body * body) / 5.0) / (1.0 + alpha * (1.0 + 2.0 * body * body) / 3.0);
         assert!((moments[1] - ((1.0 - weight) * g + weight * mean)).abs() < 1e-4, "{}", moments[1]);
     }
 

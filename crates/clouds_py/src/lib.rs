@@ -631,8 +631,7 @@ impl Renderer {
         let _inside = exit::enter(py);
         let points = points_from_python(py, points)?;
         let params: Params = params_from_python(params)?;
-        let answers =
-            detached(py, |interrupt| lock(&self.core).irradiance(&points, normal, &params, time, interrupt))?;
+        let answers = detached(py, |interrupt| lock(&self.core).irradiance(&points, normal, &params, time, interrupt))?;
         let count = answers.len();
         let numbers = answers.into_iter().flatten().flat_map(|[r, g, b, _]| [r, g, b]).collect();
         array(py, numbers, &[count, 2, 3])

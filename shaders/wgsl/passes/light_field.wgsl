@@ -77,7 +77,7 @@ fn cell_index(at: vec3i) -> u32 {
     return (u32(at.z) * level.along + u32(at.y)) * level.across + u32(at.x);
 }
 
-// Mean density of a cell, from eight points.
+// Mean density of a cell, from four points: corners of a tetrahedron.
 @compute @workgroup_size(4, 4, 4)
 fn field_density(@builtin(global_invocation_id) id: vec3u) {
     let size = level_size();
@@ -88,7 +88,7 @@ fn field_density(@builtin(global_invocation_id) id: vec3u) {
     var most = 0.0;
     var i = 0u;
     loop {
-        let aside = vec3f(vec3u(i & 1u, (i >> 1u) & 1u, i >> 2u)) * 0.5 + 0.25;
+        let aside = vec3f(vec3u(i & 1u, i >> 1u, (i ^ (i >> 1u)) & 1u)) * 0.5 + 0.25;
         let q = level_place(vec3f(id) + aside);
         let width = 0.5 * level.cell.z;
         var density = 0.0;
@@ -101,11 +101,11 @@ fn field_density(@builtin(global_invocation_id) id: vec3u) {
         sum += density;
         most = max(most, density);
         i += 1u;
-        if i >= 8u {
+        if i >= 4u {
             break;
         }
     }
-    textureStore(volume_out, id, vec4f(sum / 8.0, 0.0, most, 0.0));
+    textureStore(volume_out, id, vec4f(sum / 4.0, 0.0, most, 0.0));
 }
 
 // Texture coordinates in a texture of the level alone.

@@ -32,7 +32,7 @@ const TILT: f32 = 0.12;
 /// Sweeps of the coarsest grid, of each further grid of the cascade that starts a level, and of the levels from the
 /// second finest and the finest: the error of the fluence by the number of sweeps is in docs/accuracy.md.
 const CASCADE_SWEEPS: [u32; 3] = [16, 10, 8];
-const LEVEL_SWEEPS: [u32; 2] = [6, 3];
+const LEVEL_SWEEPS: [u32; 2] = [4, 3];
 /// Upper bound of the spectrum of a sweep that Chebyshev's iteration assumes. Eigenvalues are complex: 0.93 is the
 /// limit of stability, and 0.97 diverges.
 const SPECTRUM: f64 = 0.9;

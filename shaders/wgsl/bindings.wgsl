@@ -74,8 +74,9 @@ override LIGHT_CHEAP: bool = true; // light samples without detail noise
 // sky_scale (passes/light_shafts).
 @group(0) @binding(51) var light_shafts: texture_3d<f32>;
 
-// Light field (light_field.wgsl), levels stacked along the third axis: density (r) and optical depth toward the sun (g);
-// fluence (r) and flux of the sun's light and of the sky's. Forward chains of scattering by angle and optical depth.
+// Light field (light_field.wgsl), levels stacked along the third axis: density (r) and optical depth toward the sun
+// (g); fluence (r) and flux of the sun's light and of the sky's. Forward chains of scattering by angle and optical
+// depth.
 @group(0) @binding(81) var field_optics: texture_3d<f32>;
 @group(0) @binding(82) var field_sun: texture_3d<f32>;
 @group(0) @binding(83) var field_sky: texture_3d<f32>;
@@ -102,8 +103,8 @@ override LIGHT_CHEAP: bool = true; // light samples without detail noise
 @group(0) @binding(96) var<storage, read_write> balance: array<vec4f>; // factor on the sunlight of all cells
 @group(0) @binding(97) var sun_out: texture_storage_3d<rgba16float, write>;
 @group(0) @binding(98) var sky_out: texture_storage_3d<rgba16float, write>;
-// Light on the ground by place, levels stacked: diffuse irradiance of a sun of irradiance 1; irradiance of a uniform sky
-// relative to that without clouds; scaled and true transmittance toward the sun.
+// Light on the ground by place, levels stacked: diffuse irradiance of a sun of irradiance 1; irradiance of a uniform
+// sky relative to that without clouds; scaled and true transmittance toward the sun.
 @group(0) @binding(99) var field_ground: texture_2d<f32>;
 
 // Buffers with an entry for each pixel, row by row. Those of the clouds have an entry for each sample of the sample

@@ -58,7 +58,8 @@ fn high_layer(direction: vec3f, distance: f32, visible: bool, turned: Turn) -> L
         // Overcast is grey: seen from below, only the transmitted part of the light from above reaches the eye.
         let through = select(1.0, 1.0 / (1.0 + HIGH_ALBEDO * optical_depth), cosine > 0.0);
         // The ground below receives the light that high clouds and lower clouds transmit.
-        let ground = ground_factor(p, mu_sun) * mix(1.0, 1.0 / (1.0 + HIGH_ALBEDO * optical_depth), params.high_clouds.coverage);
+        let under = mix(1.0, 1.0 / (1.0 + HIGH_ALBEDO * optical_depth), params.high_clouds.coverage);
+        let ground = under * ground_factor(p, mu_sun);
         radiance += mix(
             ambient_below(ground * sky_light_uniform[1].rgb),
             ambient_above(sky_light_uniform[0].rgb),

@@ -274,7 +274,8 @@ fn radiance_through_air(sum: Gathered, nodes: AerialPoints, direction: vec3f) ->
         let mu = cos_zenith_at(p, frame.sky.sun_direction);
         var light = sum.sun[k] * sun_irradiance(h, mu);
         if AMBIENT {
-            light += ambient_light(sum.above[k], sum.below[k], light_from_above(h, mu), ground_factor(p, mu) * light_from_below(h, mu));
+            let ground = ground_factor(p, mu) * light_from_below(h, mu);
+            light += ambient_light(sum.above[k], sum.below[k], light_from_above(h, mu), ground);
         }
         radiance += air.transmittance * light + sum.weight[k] * air.radiance;
     }

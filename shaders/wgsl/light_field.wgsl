@@ -1,11 +1,11 @@
-// Light field: nested levels of cells around the eye, each twice as wide as the one before, over the height range of the
-// clouds; or one level over the box of the user's grid. Baked by passes/light_field.
+// Light field: nested levels of cells around the eye, each twice as wide as the one before, over the height range of
+// the clouds; or one level over the box of the user's grid. Baked by passes/light_field.
 #import bindings
 #import math
 #import chart
 
-// Place of a point given in cells of the level, m: horizontal on the chart, from the middle of the field, and height above
-// its base. In the user's grid: from the lowest corner of the field, a cell beyond that of the grid.
+// Place of a point given in cells of the level, m: horizontal on the chart, from the middle of the field, and height
+// above its base. In the user's grid: from the lowest corner of the field, a cell beyond that of the grid.
 fn level_place(cell: vec3f) -> vec3f {
     let corner = select(0.5 * vec2f(f32(level.across), f32(level.along)), vec2f(0.0), VOLUME);
     return vec3f(cell.xy - corner, cell.z) * level.cell;
@@ -67,8 +67,8 @@ fn field_sun_depth(q: vec3f) -> f32 {
     return textureSampleLevel(field_optics, clamp_sampler, uvw, 0.0).g;
 }
 
-// Radiance of forward chains (crates/clouds_core/src/scattering.rs). Loaded in f32: near the forward direction of narrow
-// peaks it exceeds half floats.
+// Radiance of forward chains (crates/clouds_core/src/scattering.rs). Loaded in f32: near the forward direction of
+// narrow peaks it exceeds half floats.
 fn forward_chains(depth: f32, one_minus_mu: f32) -> f32 {
     let last = vec2f(textureDimensions(forward_table)) - 1.0;
     let angle = 2.0 * atan2(sqrt(one_minus_mu), sqrt(max(2.0 - one_minus_mu, 0.0)));

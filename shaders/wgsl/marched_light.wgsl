@@ -1,5 +1,5 @@
-// Light of the models that march toward the sun: `seen_scattering` of a light model for the optical depth toward the sun,
-// and ambient light by two streams.
+// Light of the models that march toward the sun: `seen_scattering` of a light model for the optical depth toward the
+// sun, and ambient light by two streams.
 #import math
 #import light
 #import ambient

@@ -1,7 +1,7 @@
 // Light model `multiple`: every order of scattering. A phase function is split into light that keeps going, with the
-// moments of a forward peak, and light that turns. Light that only kept going has closed forms along straight rays; light
-// that has turned comes from the light field (passes/light_field). A single turn between two forward chains is a closed
-// form, too, and is not part of the field. Nothing is fitted.
+// moments of a forward peak, and light that turns. Light that only kept going has closed forms along straight rays;
+// light that has turned comes from the light field (passes/light_field). A single turn between two forward chains is a
+// closed form, too, and is not part of the field. Nothing is fitted.
 #import bindings
 #import math
 #import droplets
@@ -42,8 +42,8 @@ fn sky_share(column: WeatherSample) -> f32 {
     return 0.0;
 }
 
-// Optical depth toward the sun: of relief finer than a cell by samples of the density, from there on by the light field.
-// Segment k of n starts at (k / n)^2 of the reach.
+// Optical depth toward the sun: of relief finer than a cell by samples of the density, from there on by the light
+// field. Segment k of n starts at (k / n)^2 of the reach.
 fn depth_toward_sun(p: vec3f, opacity: f32, width: f32) -> f32 {
     let sun = frame.sky.sun_direction;
     let altitude = altitude_at(p);
@@ -119,8 +119,9 @@ fn slowest_extinction() -> f32 {
     return frame.sky.split.z;
 }
 
-// Irradiance of a horizontal plane on the ground by sun and sky, where the sun has the transmittance `direct` through the
-// clouds (x: scaled extinction, y: true), over that without clouds. Between the ground and clouds light goes to and fro.
+// Irradiance of a horizontal plane on the ground by sun and sky, where the sun has the transmittance `direct` through
+// the clouds (x: scaled extinction, y: true), over that without clouds. Between the ground and clouds light goes to and
+// fro.
 fn ground_lit(p: vec3f, mu: f32, direct: f32, light: vec4f) -> vec3f {
     let sun = sun_irradiance(0.0, mu);
     let sky = PI * light_from_above(0.0, mu);

@@ -10,9 +10,9 @@
 #import light_field
 
 // Directions: eight corners, up, down, and eight that are tilted out of the rows. Horizontal directions in place of the
-// tilted would never leave a row of scattered clouds: the fluence between them came out three to ten times too large. The
-// quadrature integrates second moments, and the flux of isotropic light through a plane, exactly. The tilt makes the fourth
-// moment of the vertical exact within 4 %.
+// tilted would never leave a row of scattered clouds: the fluence between them came out three to ten times too large.
+// The quadrature integrates second moments, and the flux of isotropic light through a plane, exactly. The tilt makes
+// the fourth moment of the vertical exact within 4 %.
 const DIRECTIONS = 18u;
 const CORNERS = 8u;
 const STEEP = 10u; // corners, up and down
@@ -228,8 +228,8 @@ fn cell_of(index: u32) -> vec3i {
     return vec3i(vec3u(index % size.x, index / size.x % size.y, index / (size.x * size.y)));
 }
 
-// Difference of the optical depth across a cell along an axis: the larger of those to its neighbours, as of a cell at the
-// surface of a cloud one of them lies outside.
+// Difference of the optical depth across a cell along an axis: the larger of those to its neighbours, as of a cell at
+// the surface of a cloud one of them lies outside.
 fn depth_across(at: vec3i, axis: vec3i) -> f32 {
     let size = vec3i(level_size());
     var low = at - axis;
@@ -244,8 +244,8 @@ fn depth_across(at: vec3i, axis: vec3i) -> f32 {
     return max(abs(here - under), abs(over - here));
 }
 
-// Light that the sun loses through the faces of a cell at the faces of the level, by the transmittance there, W per unit
-// of irradiance.
+// Light that the sun loses through the faces of a cell at the faces of the level, by the transmittance there, W per
+// unit of irradiance.
 fn lost_at(at: vec3i, depth: f32, extinction: f32) -> f32 {
     let size = vec3i(level_size());
     let area = vec3f(level.cell.y * level.cell.z, level.cell.x * level.cell.z, level.cell.x * level.cell.y);
@@ -265,7 +265,8 @@ fn lost_at(at: vec3i, depth: f32, extinction: f32) -> f32 {
 
 var<workgroup> partial: array<vec2f, 256>;
 
-// Ratio of the light that the sun loses in the level, by its transmittance at the faces, to what the cells take from it.
+// Ratio of the light that the sun loses in the level, by its transmittance at the faces, to what the cells take from
+// it.
 @compute @workgroup_size(256)
 fn field_balance(@builtin(local_invocation_id) id: vec3u) {
     let size = level_size();
@@ -313,8 +314,8 @@ fn write_sources(index: u32, moments: Moments) {
     textureStore(sky_out, at, nearest_half(of_sky));
 }
 
-// Nearest values that half floats hold. lavapipe rounds toward zero when it stores them: the loss of 2e-4 per scattering
-// is absorption, which takes 2 % of the light from a slab of optical depth 80.
+// Nearest values that half floats hold. lavapipe rounds toward zero when it stores them: the loss of 2e-4 per
+// scattering is absorption, which takes 2 % of the light from a slab of optical depth 80.
 fn nearest_half(v: vec4f) -> vec4f {
     return bitcast<vec4f>((bitcast<vec4u>(v) + 0x1000u) & vec4u(0xffffe000u));
 }
@@ -460,8 +461,8 @@ fn source_slope(before: vec2f, here: vec2f, next: vec2f, has_before: bool, has_n
     return select(select(vec2f(0.0), next - here, has_next), select(here - before, both, has_next), has_before);
 }
 
-// Sweeps the directions that cross rows: a thread follows a line from row to row, in a staircase along the direction. Every
-// cell lies on one line.
+// Sweeps the directions that cross rows: a thread follows a line from row to row, in a staircase along the direction.
+// Every cell lies on one line.
 @compute @workgroup_size(32, 2, 1)
 fn field_sweep_down(@builtin(global_invocation_id) id: vec3u) {
     let size = vec3i(level_size());
@@ -531,8 +532,8 @@ fn field_sweep_along(@builtin(global_invocation_id) id: vec3u) {
     let first = d * u32(size.x * size.y * size.z);
     let periodic = level.sides == SIDES_PERIODIC;
     let ahead = step.x + step.y;
-    // Rows by which the line rises from cell to cell. Around a periodic level it rises by whole rows: what leaves a cell
-    // enters another.
+    // Rows by which the line rises from cell to cell. Around a periodic level it rises by whole rows: what leaves a
+    // cell enters another.
     var rise = TILT / sqrt(1.0 - TILT * TILT) * select(level.cell.y, level.cell.x, in_x) / level.cell.z;
     rise = select(rise, max(round(rise * f32(count)), 1.0) / f32(count), periodic);
     let rounds = select(1, i32(ceil(f32(size.z) / (rise * f32(count)))) + 1, periodic);
@@ -610,8 +611,8 @@ fn field_gather(@builtin(global_invocation_id) id: vec3u) {
     write_sources(id.x, next);
 }
 
-// Stores a level in the textures of all levels. Toward its rim a level blends into the coarser one, so that reads need no
-// second level.
+// Stores a level in the textures of all levels. Toward its rim a level blends into the coarser one, so that reads need
+// no second level.
 @compute @workgroup_size(4, 4, 4)
 fn field_store(@builtin(global_invocation_id) id: vec3u) {
     let size = level_size();
@@ -636,7 +637,8 @@ fn field_store(@builtin(global_invocation_id) id: vec3u) {
             moments.sun += weight * coarser_moments[2u * other];
             moments.sky += weight * coarser_moments[2u * other + 1u];
         }
-        let beyond = textureSampleLevel(coarser_optics, clamp_sampler, level_texel(coarser_cell(at), vec3f(there)), 0.0);
+        let uvw = level_texel(coarser_cell(at), vec3f(there));
+        let beyond = textureSampleLevel(coarser_optics, clamp_sampler, uvw, 0.0);
         optics = mix(optics, beyond, share);
     }
     let out = vec3u(id.xy, level.first_row + id.z);
@@ -648,8 +650,8 @@ fn field_store(@builtin(global_invocation_id) id: vec3u) {
 // Fraction of a level's half width from which on it blends into the coarser level.
 const BLEND = 0.8;
 
-// Light on the ground under a level: `field_ground`. The radiance of each direction that leaves the lowest row meets the
-// ground beside it.
+// Light on the ground under a level: `field_ground`. The radiance of each direction that leaves the lowest row meets
+// the ground beside it.
 @compute @workgroup_size(8, 8)
 fn field_ground_bake(@builtin(global_invocation_id) id: vec3u) {
     let size = level_size();

@@ -183,16 +183,24 @@ fn march_sample(s: Segments, steps: Steps, direction: vec3f, offset: f32, i: u32
     return Sample(p, t, altitude_at(p), begin, length, max(t * pixel_size, 0.3 * length));
 }
 
-// Adds a sample to a light group: consecutive samples that share their light samples. The group's distance is the mean by
-// weight, or that of the sample if it outweighs all before it: otherwise a veil in front of a cloud would move the group
-// into the gap between them.
+// Light group: consecutive samples that share their light samples.
 struct Group {
     span: Span,
     width: f32, // footprint of the last sample, m
     opacity: f32, // opacity in front of the last sample
 }
 
-fn with_sample(given: Group, weight: f32, depth: f32, x: f32, opacity: f32, at: Sample, column: WeatherSample) -> Group {
+// Adds a sample of optical depth `x` to a group. The group's distance is the mean by weight, or that of the sample if it
+// outweighs all before it: otherwise a veil in front of a cloud would move the group into the gap between them.
+fn with_sample(
+    given: Group,
+    weight: f32,
+    depth: f32,
+    x: f32,
+    opacity: f32,
+    at: Sample,
+    column: WeatherSample,
+) -> Group {
     var group = given;
     let here = vec3f(at.t, column.precipitation, sky_share(column));
     let before = vec3f(group.span.distance, group.span.precipitation, group.span.above);
@@ -439,7 +447,8 @@ fn march_ray(direction: vec3f, turned: Turn, limit: f32, offset: f32, within: ve
         return Cloud(vec3f(0.0), 1.0, -1.0, NOWHERE);
     }
 
-    let distance = reached / (1.0 - transmittance);
+    // 1 - exp(-x) without cancellation.
+    let distance = reached / (optical_depth * one_minus_exp_over(optical_depth));
     var radiance = gathered_radiance(sum, nodes, direction);
     if ends {
         radiance *= tail_scale(transmittance);

@@ -186,7 +186,7 @@ fn finished(given: ReferenceRay, index: u32, nodes: AerialPoints, direction: vec
     var ray = given;
     let sum = Gathered(ray.sun, ray.above, ray.below, ray.weight);
     let transmittance = transmittance_of(ray.optical_depth);
-    let whole = 1.0 - transmittance;
+    let whole = ray.optical_depth * one_minus_exp_over(ray.optical_depth); // 1 - exp(-x)
     let radiance = gathered_radiance(sum, nodes, direction);
     let result = vec4f(radiance + forward_background(direction, transmittance, ray.optical_depth), transmittance);
     let change = abs(result - ray.previous);

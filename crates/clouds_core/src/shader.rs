@@ -39,9 +39,11 @@ pub fn read(name: &str) -> Option<String> {
     gpu::read(name, generated)
 }
 
-/// Links a WGSL file with all of its imports.
+/// Links a WGSL file with all of its imports. The file of a light model is linked as that model.
 pub fn link(name: &str) -> std::result::Result<Linked, String> {
-    Linked::new(name, &[specialization::light_model(Model::Octaves)], generated)
+    let own = names().find(|known| *known == name && known.starts_with("light_models/"));
+    let model = own.map_or(specialization::light_model(Model::Octaves), |file| ("light_model", file));
+    Linked::new(name, &[model], generated)
 }
 
 /// Links WGSL source with all of its imports.

@@ -1,7 +1,7 @@
 // Light model `nubis2015`: Beer's law, times powder, times Henyey-Greenstein, times 2, plus ambient light.
 #import bindings
 #import marched_light
-#import light_models/beer_powder
+#import beer_powder
 
 const AMBIENT = true;
 

@@ -1,7 +1,7 @@
 // Light model `thesis2018`: `nubis2015` with a slower second term of Beer's law and the larger of two lobes.
 #import bindings
 #import marched_light
-#import light_models/beer_powder
+#import beer_powder
 
 const AMBIENT = true;
 

@@ -1,7 +1,7 @@
 // Light model `vsu2022`: `nubis2015` with a blend of two lobes.
 #import bindings
 #import marched_light
-#import light_models/beer_powder
+#import beer_powder
 
 const AMBIENT = true;
 

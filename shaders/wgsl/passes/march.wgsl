@@ -190,8 +190,8 @@ struct Group {
     opacity: f32, // opacity in front of the last sample
 }
 
-// Adds a sample of optical depth `x` to a group. The group's distance is the mean by weight, or that of the sample if it
-// outweighs all before it: otherwise a veil in front of a cloud would move the group into the gap between them.
+// Adds a sample of optical depth `x` to a group. The group's distance is the mean by weight, or that of the sample if
+// it outweighs all before it: otherwise a veil in front of a cloud would move the group into the gap between them.
 fn with_sample(
     given: Group,
     weight: f32,

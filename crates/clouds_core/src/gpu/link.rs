@@ -44,6 +44,9 @@ impl Linked {
                         let resolved = table.iter().find(|(name, _)| *name == import);
                         linked.resolved.extend(resolved);
                         let import = resolved.map_or(import, |(_, file)| *file);
+                        if resolved.is_some() && !seen.insert(import.to_owned()) {
+                            continue;
+                        }
                         let source = read(import, generated).ok_or_else(|| format!("{file}: {}", missing(import)))?;
                         queue.push((import.to_owned(), source));
                     }

@@ -16,14 +16,14 @@ use crate::shared::constants;
 use crate::uniforms::{FieldLevel, uniform};
 
 constants! {
-    /// Sides of a level: dark but for the sky.
-    const SIDES_OPEN: u32 = 0;
     /// Sides of a level: what leaves at one side enters at the other.
     const SIDES_PERIODIC: u32 = 1;
     /// Sides of a level: radiance of the coarser level around it.
     const SIDES_COARSER: u32 = 2;
 }
 
+/// Sides of a level: dark but for the sky.
+const SIDES_OPEN: u32 = 0;
 /// Directions of the lattice, and those of them that are steep or tilted out of the rows.
 const DIRECTIONS: u64 = 18;
 const STEEP: u32 = 10;

@@ -642,8 +642,8 @@ class Quality(Block):
         deck. Allowed: a whole number from 1 to 128.
     light_group_weight : float
         Light-group weight: consecutive view samples are lit as a group, by light samples from one
-        point, once their opacity in the pixel exceeds this share. 0 lights each view sample by
-        itself. Allowed: a number from 0 to 1.
+        point, once their opacity in the pixel exceeds this share, or where clear air follows. 0
+        lights each view sample by itself. Allowed: a number from 0 to 1.
     light_distance : float
         Reach of the light samples; 0 extends them to the end of the clouds. Allowed: a number from
         0 to 100000 m.

@@ -45,7 +45,7 @@ fn ground_factor(p: vec3f, mu: f32) -> vec3f {
     return vec3f(ground_share());
 }
 
-// Radiance of the ground at a point of it, where the sun has the transmittance `sun` through the clouds.
+// Radiance of the ground at a point of it that the fraction `sun` of the sun's light reaches.
 fn ground_under(p: vec3f, mu: f32, sun: f32) -> vec3f {
     return ground_radiance(mu) - (1.0 - sun) * kept_sunlight(mu);
 }
@@ -58,6 +58,12 @@ fn kept_sunlight(mu: f32) -> vec3f {
 // Ambient light of a sky and a ground of the given radiances.
 fn ambient_light(above: f32, below: f32, sky: vec3f, ground: vec3f) -> vec3f {
     return above * ambient_above(clouded_sky(sky)) + below * ambient_below(ground);
+}
+
+// Mean radiance over the sphere of the sunlight that clouds scatter to the air, where they take the fraction `shade`
+// of the sun's: isotropic light from above.
+fn cloud_light(p: vec3f, altitude: f32, mu: f32, shade: f32) -> f32 {
+    return PASSED_ON * max(mu, 0.0) / (2.0 * PI) * shade;
 }
 
 // Light of the background that clouds have scattered forward.

@@ -459,7 +459,8 @@ params! {
         /// (`light_distance` 0), points below a second deck take a third more, for that deck.
         light_steps: u32 = 16, in 1..=128 "";
         /// Light-group weight: consecutive view samples are lit as a group, by light samples from one point, once
-        /// their opacity in the pixel exceeds this share. 0 lights each view sample by itself.
+        /// their opacity in the pixel exceeds this share, or where clear air follows. 0 lights each view sample by
+        /// itself.
         light_group_weight: f32 = 0.15, in 0..=1 "";
         /// Reach of the light samples; 0 extends them to the end of the clouds.
         light_distance: f32 = 0.0, in 0..=100000 "m";

@@ -139,7 +139,7 @@ fn ground_factor(p: vec3f, mu: f32) -> vec3f {
     return min(ground_lit(p, mu, light.z, light) / max(clear, vec3f(1e-30)), vec3f(2.0));
 }
 
-// Radiance of the ground at a point of it, where the sun has the true transmittance `sun` through the clouds.
+// Radiance of the ground at a point of it that the fraction `sun` of the sun's light reaches.
 fn ground_under(p: vec3f, mu: f32, sun: f32) -> vec3f {
     if VOLUME {
         let passed = mix(PASSED_ON, 1.0, sun);
@@ -147,11 +147,22 @@ fn ground_under(p: vec3f, mu: f32, sun: f32) -> vec3f {
         return params.atmosphere.ground_albedo * light;
     }
     let light = field_ground_at(field_place(p, altitude_at(p)).xy);
-    return params.atmosphere.ground_albedo / PI * ground_lit(p, mu, pow(sun, frame.sky.split.z), light);
+    return params.atmosphere.ground_albedo / PI * ground_lit(p, mu, sun, light);
 }
 
 fn ambient_light(above: f32, below: f32, sky: vec3f, ground: vec3f) -> vec3f {
     return above * ambient_above(sky) + below * ambient_below(ground);
+}
+
+// Mean radiance over the sphere of the sunlight that clouds scatter to the air; below and above them that at their base
+// and top.
+fn cloud_light(p: vec3f, altitude: f32, mu: f32, shade: f32) -> f32 {
+    if VOLUME {
+        return PASSED_ON * max(mu, 0.0) / (2.0 * PI) * shade;
+    }
+    let q = field_place(p, altitude);
+    let uvw = field_texel(q, field_level(q));
+    return textureSampleLevel(field_sun, clamp_sampler, uvw, 0.0).r / (4.0 * PI);
 }
 
 fn forward_background(direction: vec3f, transmittance: f32, depth: f32) -> vec3f {

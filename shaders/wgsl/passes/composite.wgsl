@@ -520,12 +520,14 @@ fn sight_of(direction: vec3f, corner: vec2f, pixel: vec2u, scene: f32, here: Lay
     if ground.enters {
         let p = ground.near * direction;
         let mu = cos_zenith_at(p, frame.sky.sun_direction);
-        let clear = ground_radiance(mu);
-        found.background += air.transmittance * clear;
         if GROUND_SHADOW {
+            let clear = ground_under(p, mu, 1.0);
+            found.background += air.transmittance * clear;
             found.sunlight = air.transmittance * (clear - ground_under(p, mu, 0.0));
-            found.shadow = air.transmittance * (clear - ground_under(p, mu, ground_sun(p, mu)));
+            found.shadow = (1.0 - ground_sun(p, mu)) * found.sunlight;
             found.background = max(found.background - found.shadow, vec3f(0.0));
+        } else {
+            found.background += air.transmittance * ground_radiance(mu);
         }
     }
     if SCENE && scene < NO_SCENE {
@@ -541,7 +543,7 @@ fn sight_of(direction: vec3f, corner: vec2f, pixel: vec2u, scene: f32, here: Lay
     return found;
 }
 
-// Transmittance of all clouds toward the sun at a point of the ground.
+// Fraction of the sun's light that clouds leave a point of the ground.
 fn ground_sun(p: vec3f, mu: f32) -> f32 {
     var sun = 1.0;
     if !CLOUDLESS {

@@ -102,7 +102,7 @@ fn incoming(p: vec3f, direction: vec3f) -> vec3f {
     if ground.enters {
         let there = p + ground.near * direction;
         let light = field_ground_at(field_place(there, 0.0).xy);
-        radiance += transmittance * ground_under(there, mu, pow(light.z, 1.0 / scale));
+        radiance += transmittance * ground_under(there, mu, light.z);
     } else if AIR {
         radiance += transmittance * sky_radiance(direction);
     }

@@ -6,6 +6,7 @@
 #import aerial
 #import light_shafts
 #import ground_shadow
+#import light
 
 // Steps between two slices. With 2, rings are visible in the sky of `sunset`. With 8, the lack has the same error as
 // with 3: 2 to 10 % where shadows are smooth (tests/test_light_shafts.py).
@@ -59,9 +60,9 @@ fn light_shafts_bake(@builtin(global_invocation_id) id: vec3u) {
             let mu_sun = cos_zenith_at(p, frame.sky.sun_direction);
             let parts = air_parts(h);
             let shade = 1.0 - baked_air_sun(p, h, mu_sun, spread * step);
-            // Clouds pass on a part of the sunlight as isotropic light from above.
-            let even = (RAYLEIGH * parts.x + MIE_SCATTERING * parts.y) * (PASSED_ON * max(mu_sun, 0.0) / (2.0 * PI));
-            let source = (air_scattering_toward(parts, one_minus_cosine) - even) * sunlight(h, mu_sun) * shade;
+            // Clouds scatter a part of the sunlight to the air.
+            let even = (RAYLEIGH * parts.x + MIE_SCATTERING * parts.y) * cloud_light(p, h, mu_sun, shade);
+            let source = (air_scattering_toward(parts, one_minus_cosine) * shade - even) * sunlight(h, mu_sun);
             let x = air_extinction(parts) * step;
             lack += exp(-depth) * source * step * one_minus_exp_over3(x);
             depth += x;

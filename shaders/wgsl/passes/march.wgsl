@@ -412,7 +412,10 @@ fn march_ray(direction: vec3f, turned: Turn, limit: f32, offset: f32, within: ve
             }
             let of_rain = select(1.0, RAIN_SHARE, RAIN_SHAFTS && column.medium == RAIN);
             let share = rays * params.quality.light_group_weight * of_rain;
-            if group.span.weight > select(share, 0.0, i >= end) {
+            // A veil before a gap has light of its own. Lit with the clouds behind, it had dots where a little more or
+            // less of it decided where the group was lit (`storm`). It takes 3 % of the time.
+            let parted = empty >= params.quality.empty_before_coarse;
+            if group.span.weight > select(share, 0.0, i >= end || parted) {
                 group.span.is_last = ends;
                 groups[count] = group;
                 count += 1u;

@@ -53,7 +53,8 @@ fn shadow_ground(
     var k = 0.0;
     loop {
         let aside = texel * (fract(0.5 + k * vec2f(0.7548776662, 0.5698402910)) - 0.5);
-        sum += exp(-cloud_depth_to_sun(ground_place(at + aside), fine, GROUND_STEPS));
+        // With a light field, what clouds scatter forward reaches the ground, too: there the extinction is scaled.
+        sum += exp(-frame.sky.split.z * cloud_depth_to_sun(ground_place(at + aside), fine, GROUND_STEPS));
         k += 1.0;
         if k >= places {
             break;

@@ -18,14 +18,15 @@ constants! {
     const SHADOW_LEVELS: u32 = 5;
 }
 
-/// Key of the shadow clipmap: shadow casters, planet and grid, snapped position and time, texel size.
-pub(crate) type Key = (Casters, (f32, Grid), [i64; 3], f32);
+/// Key of the shadow clipmap: shadow casters, planet and grid, snapped position and time, texel size, scale of the
+/// extinction.
+pub(crate) type Key = (Casters, (f32, Grid), [i64; 3], [f32; 2]);
 
 /// Key of the shadow clipmap of a picture.
 pub(crate) fn key(inputs: &Inputs<'_>) -> Key {
     let Inputs { params, frame, eye, time, .. } = *inputs;
     let planet = (params.atmosphere.planet_radius, Grid(params.volume.clone()));
-    (casters(params), planet, origin(eye, params, time).steps, frame.sky.shadow_texel)
+    (casters(params), planet, origin(eye, params, time).steps, [frame.sky.shadow_texel, frame.sky.split[2]])
 }
 
 /// Shadow clipmap on the GPU.

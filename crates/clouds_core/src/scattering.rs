@@ -18,10 +18,13 @@ fn angles(count: usize) -> Vec<f64> {
     (0..count).map(|i| PI * (0.5 * PI * i as f64 / (count - 1) as f64).sin().powi(2)).collect()
 }
 
+/// Phase function by angle in 1/sr, and its integral from the forward direction.
+type PhaseTable = Arc<Vec<[f32; 2]>>;
+
 /// Mie phase function of a droplet diameter in µm by angle, in 1/sr, with its integral from the forward direction. Kept
 /// on disk, as the largest droplets take a second, and in memory.
-pub(crate) fn mie_table(diameter: f32) -> Arc<Vec<[f32; 2]>> {
-    static TABLES: OnceLock<Mutex<HashMap<u32, Arc<Vec<[f32; 2]>>>>> = OnceLock::new();
+pub(crate) fn mie_table(diameter: f32) -> PhaseTable {
+    static TABLES: OnceLock<Mutex<HashMap<u32, PhaseTable>>> = OnceLock::new();
     let mut tables = TABLES.get_or_init(Mutex::default).lock().unwrap_or_else(std::sync::PoisonError::into_inner);
     let key = format!("{diameter} {ENTRIES} {}", mie::VERSION);
     let load = || {

@@ -596,7 +596,6 @@ impl Renderer {
 
     /// Light field of given cells: moments of each cell (8), scaled extinction and sunlight of each cell (2), factor on the
     /// sunlight.
-    #[expect(clippy::type_complexity, reason = "the arrays of a test")]
     fn solve_light<'py>(
         &self,
         extinction: PyReadonlyArray3<'py, f32>,

@@ -343,7 +343,7 @@ fn bake(rec: &mut Recorder<'_>, inputs: &Inputs<'_>, shape: &FieldShape, lit: bo
     Ok((stacks, ground))
 }
 
-/// Cells of given extinctions for [`solve_cells`].
+/// Cells of given extinctions for [`crate::Renderer::solve_light`].
 pub struct Cells<'a> {
     /// Extinction of each cell in 1/m, x first.
     pub extinction: &'a [f32],

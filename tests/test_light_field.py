@@ -229,8 +229,7 @@ def one_sun(x, y, params):
 
 def test_irradiance_on_the_ground_of_a_deck(renderer):
     """Mean over points under an overcast: what an all-sky picture of the clouds gathers."""
-    params = nubis.scenes["stratocumulus"][1]
-    params.with_(
+    params = nubis.scenes["stratocumulus"][1].with_(
         **{
             "light.model": "multiple",
             "light.g": 0.85,

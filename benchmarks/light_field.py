@@ -121,7 +121,11 @@ def main() -> None:
     if arguments.truth:
         store(arguments.paths)
         return
-    print(measure.where())
+    made = measure.header(["benchmarks.light_field"])
+    adapter = made["adapter"]
+    print(
+        f"{made['date']}, {adapter['name']} ({adapter['driver']}), {made['cpu']}, {made['cores']} cores"
+    )
     truth = np.load(STORE)
     models = ("single", G), ("octaves", 0.6), ("octaves", G), ("multiple", G)
     print("| sky, sun | noise | " + " | ".join(f"{m}, g {g}" for m, g in models) + " |")

@@ -654,7 +654,8 @@ class Quality(Block):
         Cell of the finest level of the light field. Allowed: a number from 10 to 10000 m.
     relief_samples : int
         Number of density samples toward the sun, near the view sample, before the light field is
-        read: relief finer than its cells. Allowed: a whole number from 0 to 64.
+        read. They reach across as many of its cells, whose relief they add. Allowed: a whole number
+        from 0 to 64.
     far_sample : bool
         Whether a further light sample is taken at three times the reach of the others, for shadows
         of distant clouds (nubis2015). Allowed: True or False.
@@ -709,7 +710,7 @@ class Quality(Block):
     light_distance: float = 0.0
     field_cells: int = 64
     field_cell: float = 100.0
-    relief_samples: int = 2
+    relief_samples: int = 4
     far_sample: bool = False
     cone: float = 0.0
     light_detail_cutoff: float = 1.0

@@ -468,9 +468,9 @@ params! {
         field_cells: u32 = 64, in 16..=128 "";
         /// Cell of the finest level of the light field.
         field_cell: f32 = 100.0, in 10..=10000 "m";
-        /// Number of density samples toward the sun, near the view sample, before the light field is read: relief finer
-        /// than its cells.
-        relief_samples: u32 = 2, in 0..=64 "";
+        /// Number of density samples toward the sun, near the view sample, before the light field is read. They reach
+        /// across as many of its cells, whose relief they add.
+        relief_samples: u32 = 4, in 0..=64 "";
         /// Whether a further light sample is taken at three times the reach of the others, for shadows of distant
         /// clouds (nubis2015).
         far_sample: bool = false;

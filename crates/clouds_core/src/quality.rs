@@ -21,6 +21,7 @@ impl Quality {
             min_transmittance: 0.03,
             adaptive_threshold: 0.5,
             path_samples: 16,
+            relief_samples: 2,
             ..balanced.clone()
         };
         Ok(match name {
@@ -40,6 +41,7 @@ impl Quality {
                 path_samples: 256,
                 field_cells: 96,
                 field_cell: 50.0,
+                relief_samples: 16,
                 ..balanced
             },
             "reference" => Self {

@@ -11,9 +11,6 @@
 
 const AMBIENT = true;
 
-// Reach of the relief samples, in cells of the light field along the ray toward the sun.
-const RELIEF_CELLS = 2.0;
-
 fn lobe_phase(one_minus_mu: f32) -> f32 {
     return henyey_greenstein(one_minus_mu, params.light.g);
 }
@@ -50,7 +47,7 @@ fn depth_toward_sun(p: vec3f, opacity: f32, width: f32) -> f32 {
     let q = field_place(p, altitude);
     let along = abs(field_direction(sun, cos_zenith_at(p, sun)));
     let cell = frame.sky.field_cell * vec3f(vec2f(exp2(field_level(q))), 1.0);
-    let reach = RELIEF_CELLS / max(max(along.x / cell.x, along.y / cell.y), along.z / cell.z);
+    let reach = f32(params.quality.relief_samples) / max(max(along.x / cell.x, along.y / cell.y), along.z / cell.z);
     let n = params.quality.relief_samples;
     var depth = 0.0;
     var begin = 0.0;

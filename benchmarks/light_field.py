@@ -123,9 +123,8 @@ def main() -> None:
         return
     made = measure.header(["benchmarks.light_field"])
     adapter = made["adapter"]
-    print(
-        f"{made['date']}, {adapter['name']} ({adapter['driver']}), {made['cpu']}, {made['cores']} cores"
-    )
+    machine = f"{made['cpu']}, {made['cores']} cores"
+    print(f"{made['date']}, {adapter['name']} ({adapter['driver']}), {machine}")
     truth = np.load(STORE)
     models = ("single", G), ("octaves", 0.6), ("octaves", G), ("multiple", G)
     print("| sky, sun | noise | " + " | ".join(f"{m}, g {g}" for m, g in models) + " |")

@@ -310,3 +310,24 @@ def test_nested_levels_against_one(rng, elevation):
         for got, want, bound in zip(few[1:], many[1:], bounds, strict=True):
             error = np.sqrt((density * (got - want) ** 2).sum() / (density * want**2).sum())
             assert error < bound
+
+
+def test_a_deep_slab_is_solved(renderer):
+    """The sweeps that a picture has suffice for the slowest modes: light below an optical depth of
+    80, in the middle of a wide box, is what Monte Carlo transmits (0.120 of the sun's).
+    """
+    wide = 20_000.0
+    grid = nubis.DensityGrid(
+        np.full((10, 20, 20), 0.08, np.float32),
+        ((-wide / 2, -wide / 2, 1000.0), (wide / 2, wide / 2, 2000.0)),
+    )
+    params = nubis.Params(
+        volume=grid,
+        light=nubis.params.Light(model="multiple", g=0.85, albedo=1.0),
+        atmosphere=nubis.params.Atmosphere(enabled=False, ground_albedo=(0.0, 0.0, 0.0)),
+        sun=nubis.params.Sun(elevation=63.4, irradiance=(1.0, 1.0, 1.0)),
+    )
+    # Right below the base: from the ground the sides of the box are in sight.
+    direct, diffuse = renderer(8, 8, "draft").irradiance([(0.0, 0.0, 999.0)], params)
+    assert direct.max() < 1e-6
+    assert diffuse[0, 0] / np.sin(np.radians(63.4)) == pytest.approx(0.120, rel=0.2)

@@ -26,6 +26,8 @@ pub(crate) struct FieldShape {
 const LEAST_ROWS: u32 = 20;
 /// Largest number of rows.
 const MOST_ROWS: u32 = 64;
+/// Number of cells along a side of a grid that a grid of fewer voxels has, too; with fewer rows cells are flat.
+const FEWEST_CELLS: f32 = 16.0;
 /// Largest number of cells of a grid's level: its radiances, of 72 bytes per cell, fit a buffer of 128 MiB.
 const MOST_CELLS: f32 = 1.5e6;
 /// Half width of the coarsest level of clouds, m: clouds beyond hide behind nearer ones.
@@ -45,12 +47,16 @@ impl FieldShape {
         if let Some(grid) = &params.volume {
             let [low, high] = grid.bounds();
             let side = (high - low).as_vec3();
-            // Cubes: as many cells as a level of clouds has across, each way, but none smaller than a voxel.
-            let voxel = (side / glam::UVec3::from_array(grid.size().map(|n| n as u32)).as_vec3()).min_element();
+            let voxel = side / glam::UVec3::from_array(grid.size().map(|n| n as u32)).as_vec3();
+            // None smaller than a voxel, unless voxels are few.
+            let least = voxel.min(side / FEWEST_CELLS);
+            // Cubes: as many cells as a level of clouds has across, each way. Flat cells where cubes would be few upward.
             let most = (across as f32).powi(3).min(MOST_CELLS);
-            let cube = (side.x * side.y * side.z / most).cbrt();
-            let cell = cube.max(voxel);
-            let cells = side.to_array().map(|side| ((side / cell).round() as u32).clamp(2, 4 * across));
+            let cube = (side.element_product() / most).cbrt();
+            let height = cube.min(side.z / FEWEST_CELLS).max(least.z);
+            let wide = (side.element_product() / (most * height)).sqrt().max(least.x.min(least.y));
+            let count = |side: f32, cell: f32| ((side / cell).round() as u32).clamp(2, 4 * across);
+            let cells = [count(side.x, wide), count(side.y, wide), count(side.z, height)];
             let cell: [f32; 3] = std::array::from_fn(|axis| side[axis] / cells[axis] as f32);
             // An empty cell on each side: the light at a face is between that of a cell inside and one outside.
             return Self { cells: cells.map(|n| n + 2), cell, base: low.z as f32 - cell[2], levels: 1, halvings: 0 };

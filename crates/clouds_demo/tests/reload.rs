@@ -54,13 +54,11 @@ fn saved_shaders_take_effect_and_invalid_ones_are_reported() {
 
     let path = folder.join("passes").join("march.wgsl");
     let good = fs::read_to_string(&path).expect("was copied");
-    fs::write(&path, good.replace("return Cloud(scale * gathered", "return Cloud(missing * gathered"))
-        .expect("is saved");
+    fs::write(&path, good.replace("return Cloud(radiance,", "return Cloud(missing * radiance,")).expect("is saved");
     step_until(&mut harness, |app| app.notice().contains("march.wgsl:"));
     assert_eq!(mean(harness.state()), Some(before));
 
-    fs::write(&path, good.replace("return Cloud(scale * gathered", "return Cloud(3.0 * scale * gathered"))
-        .expect("is saved");
+    fs::write(&path, good.replace("return Cloud(radiance,", "return Cloud(3.0 * radiance,")).expect("is saved");
     step_until(&mut harness, |app| mean(app).is_some_and(|now| now > 1.2 * before));
     fs::remove_dir_all(&folder).expect("was made");
 }

@@ -266,6 +266,39 @@ def test_irradiance_of_no_plane(renderer, normal):
         renderer(8, 8).irradiance([(0, 0, 0)], params, normal=normal)
 
 
+@pytest.mark.parametrize("g", [-0.9, -0.5, 0.0, 0.99])
+def test_any_phase_function(renderer, g):
+    """Clouds that scatter all light send back no more than comes in; the ground stays lit."""
+    camera, params = nubis.scenes["fair_weather"]
+    params = params.with_(**{"light.g": g, "light.albedo": 1.0, "high_clouds.coverage": 0.0})
+    bright = {}
+    for model in ("octaves", "multiple"):
+        picture = renderer(64, 36).render(camera, params.with_(**{"light.model": model}))
+        bright[model] = picture[-6:, :, :3].mean()
+    assert bright["multiple"] == pytest.approx(bright["octaves"], rel=0.2)
+    points = np.array([(x, 0.0, z) for x in (-900.0, 0.0, 900.0) for z in (1300.0, 1700.0)])
+    direct, diffuse = renderer(64, 36).irradiance(
+        points, params.with_(**{"light.model": "multiple"})
+    )
+    assert (direct + diffuse < 2 * np.array(params.sun.irradiance)).all() and (diffuse > 0).all()
+
+
+@pytest.mark.parametrize("high", [0.0, 0.6])
+def test_a_sky_without_marched_clouds(renderer, high):
+    """It has no field. Its ground is that of the other models, whose shadows of high clouds are all
+    but the same.
+    """
+    camera = nubis.Camera.look_at((0, 0, 200), (900, 700, 0), fov_y=40)
+    params = nubis.Params().with_(
+        **{"clouds.coverage": 0.0, "high_clouds.coverage": high, "light.g": 0.85}
+    )
+    ground = {
+        model: renderer(32, 18).render(camera, params.with_(**{"light.model": model}))[-6:]
+        for model in ("octaves", "multiple")
+    }
+    np.testing.assert_allclose(ground["multiple"], ground["octaves"], rtol=0.12 if high else 1e-5)
+
+
 def test_the_same_after_another_sky(renderer):
     """The field depends on the picture alone."""
     camera, params = nubis.scenes["fair_weather"]

@@ -88,6 +88,10 @@ fn forward_entry(i: vec2u) -> f32 {
 // Light on the ground at a place (`field_ground`). It is read where cells are as wide as the clouds' base is high: the
 // directions of the lattice would print copies of narrower gaps.
 fn field_ground_at(q: vec2f) -> vec4f {
+    // A sky without marched clouds has no field.
+    if frame.sky.field_size.w < 1.0 {
+        return vec4f(0.0, 1.0, 1.0, 1.0);
+    }
     let across = frame.sky.field_size.x;
     let wide = ceil(log2(max(frame.sky.field_base / frame.sky.field_cell.x, 1.0)));
     let which = min(max(field_level(vec3f(q, 0.0)), wide), frame.sky.field_size.w - 1.0);

@@ -21,8 +21,8 @@ pub(crate) struct FieldShape {
     pub halvings: u32,
 }
 
-/// Smallest number of rows of a level of clouds: with fewer, light below a deck of 400 m is 12 to 41 % too bright
-/// (docs/accuracy.md).
+/// Smallest number of rows of a level of clouds: half as many are too few for decks that fill a third of the shell
+/// (docs/notes/accuracy.md).
 const LEAST_ROWS: u32 = 20;
 /// Largest number of rows.
 const MOST_ROWS: u32 = 64;

@@ -156,7 +156,8 @@ impl Split {
             mean_cosine,
             scale,
             albedo: albedo * (1.0 - forward) / scale,
-            turned_cosine: (mean_cosine - forward) / (1.0 - forward),
+            // Light that scatters backwards turns evenly: with a negative mean cosine the sweeps diverge.
+            turned_cosine: ((mean_cosine - forward) / (1.0 - forward)).max(0.0),
         }
     }
 }
@@ -180,8 +181,11 @@ pub(crate) fn forward_table(light: &Light) -> Vec<f32> {
     let cosine: Vec<_> = (0..columns).map(|i| (PI * square(i, columns)).cos()).collect();
     let mut table = vec![0.0; columns * rows];
     let (mut before, mut now) = (vec![0.0; columns], vec![1.0; columns]);
+    // A series that is cut off tapers off: otherwise it rings around the sun.
+    let cut = moments.len() == MOST_MOMENTS;
     for (l, moment) in moments.iter().enumerate() {
         let n = l as f64;
+        let taper = if cut { (1.0 - (n / MOST_MOMENTS as f64).powi(2)).powi(2) } else { 1.0 };
         let keeps = if l < 2 { split.forward } else { *moment };
         for row in 0..rows {
             let depth = FORWARD_DEPTH * square(row, rows);
@@ -192,7 +196,7 @@ pub(crate) fn forward_table(light: &Light) -> Vec<f32> {
             } else {
                 ((x - depth).exp() - (-depth).exp()) / x - (-depth).exp()
             };
-            let weight = (2.0 * n + 1.0) / (4.0 * PI) * keeps * chains;
+            let weight = taper * (2.0 * n + 1.0) / (4.0 * PI) * keeps * chains;
             for (column, polynomial) in now.iter().enumerate() {
                 table[row * columns + column] += weight * polynomial;
             }

@@ -137,8 +137,8 @@ crate::params! {
         split: [f32; 4] = [0.0, 0.0, 1.0, 0.0];
         /// Mean cosine of the light that turns.
         turned_cosine: f32 = 0.0;
-        /// Cells of the finest level of the light field: across, along, rows; number of levels.
-        field_size: [f32; 4] = [1.0; 4];
+        /// Cells of the finest level of the light field: across, along, rows; number of levels, 0 without a field.
+        field_size: [f32; 4] = [1.0, 1.0, 1.0, 0.0];
         /// Cell of the finest level, m.
         field_cell: [f32; 3] = [1.0; 3];
         /// Altitude of the base of the lowest row, m.

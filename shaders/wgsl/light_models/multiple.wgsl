@@ -116,10 +116,8 @@ fn slowest_extinction() -> f32 {
     return frame.sky.split.z;
 }
 
-// Irradiance of a horizontal plane on the ground by sun and sky, where the sun has the transmittance `direct` through
-// the clouds (x: scaled extinction, y: true), over that without clouds. Between the ground and clouds light goes to and
-// fro.
-fn ground_lit(p: vec3f, mu: f32, direct: f32, light: vec4f) -> vec3f {
+// Irradiance of the ground that the fraction `direct` of the sun's light reaches, and of what clouds send back to it.
+fn ground_lit(mu: f32, direct: f32, light: vec4f) -> vec3f {
     let sun = sun_irradiance(0.0, mu);
     let sky = PI * light_from_above(0.0, mu);
     let lit = sun * (max(mu, 0.0) * direct + light.x) + sky * light.y;
@@ -133,7 +131,7 @@ fn ground_factor(p: vec3f, mu: f32) -> vec3f {
     }
     let light = field_ground_at(field_place(p, altitude_at(p)).xy);
     let clear = sun_irradiance(0.0, mu) * max(mu, 0.0) + PI * light_from_above(0.0, mu);
-    return min(ground_lit(p, mu, light.z, light) / max(clear, vec3f(1e-30)), vec3f(2.0));
+    return min(ground_lit(mu, light.z, light) / max(clear, vec3f(1e-30)), vec3f(2.0));
 }
 
 // Radiance of the ground at a point of it that the fraction `sun` of the sun's light reaches.
@@ -144,7 +142,7 @@ fn ground_under(p: vec3f, mu: f32, sun: f32) -> vec3f {
         return params.atmosphere.ground_albedo * light;
     }
     let light = field_ground_at(field_place(p, altitude_at(p)).xy);
-    return params.atmosphere.ground_albedo / PI * ground_lit(p, mu, sun, light);
+    return params.atmosphere.ground_albedo / PI * ground_lit(mu, sun, light);
 }
 
 fn ambient_light(above: f32, below: f32, sky: vec3f, ground: vec3f) -> vec3f {

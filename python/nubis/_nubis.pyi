@@ -265,6 +265,9 @@ class Renderer:
         eye: tuple[float, float, float],
         time: float,
     ) -> npt.NDArray[np.float32]: ...
+    def light_field(
+        self, camera: Camera, params: Params, time: float, how: tuple[int, bool]
+    ) -> list[npt.NDArray[np.float32]]: ...
     def solve_light(
         self,
         extinction: npt.NDArray[np.float32],

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nubis._arrays import numbers
+from nubis._nubis import Camera
 from nubis._renderer import Renderer
 from nubis.params import Light, Params, Quality
 
@@ -107,3 +108,37 @@ def solve_light(
     moments, deposits, factor = core.solve_light(cells, cell, sun, (periodic, sweeps), given)
     of_sun, of_sky = np.moveaxis(moments, -1, 0).reshape(2, 4, *cells.shape)
     return of_sun, of_sky, np.moveaxis(deposits, -1, 0), factor
+
+
+def light_field(
+    renderer: Renderer,
+    camera: Camera,
+    params: Params,
+    *,
+    time: float = 0.0,
+    sweeps: int = 1,
+    animated: bool = False,
+) -> tuple[npt.NDArray[np.float32], ...]:
+    """Return the light field of a shot, with the light model ``"multiple"``.
+
+    Parameters
+    ----------
+    renderer : Renderer
+    camera : Camera
+    params : Params
+    time : float
+        Time in seconds.
+    sweeps : int
+        Factor on the numbers of sweeps.
+    animated : bool
+        Whether to return the field of the last frame of `Renderer.animate` instead, whatever the
+        shot.
+
+    Returns
+    -------
+    optics, of_sun, of_sky : array of float32, shape (rows of all levels, ny, nx, 4)
+        Density, optical depth toward the sun; fluence and flux of light that has turned, for a sun
+        of irradiance 1 and for a uniform sky of radiance 1. The rows of the finest level are first.
+    """
+    textures = renderer._core.light_field(camera, params, time, (sweeps, animated))
+    return tuple(textures)

@@ -7,6 +7,7 @@
 // (crates/clouds_core/src/specialization.rs).
 override PHASE: u32 = 0u; // light.phase
 override VOLUME: bool = false; // clouds from the user's grid instead of procedural ones
+override ALONE: bool = false; // a grid of the light field swept by one workgroup
 override KEEP_CLEAR: bool = false; // a region kept clear of clouds
 override CAMERA: u32 = 0u; // projection (camera.wgsl)
 override PRECISE: bool = false; // the user's grid read by loads in f32, not by hardware filters in half floats
@@ -84,21 +85,25 @@ override LIGHT_CHEAP: bool = true; // light samples without detail noise
 
 // Level of the light field while it is solved (passes/light_field). Cells are stored row by row.
 @group(0) @binding(85) var<uniform> level: FieldLevel;
-@group(0) @binding(86) var level_optics: texture_3d<f32>; // as `field_optics`, and the largest density (b)
+// As `field_optics`, with the largest density (b), `field_sun` and `field_sky`.
+@group(0) @binding(86) var level_optics: texture_3d<f32>;
+@group(0) @binding(94) var level_sun: texture_3d<f32>;
+@group(0) @binding(101) var level_sky: texture_3d<f32>;
+// Those of the level around it.
 @group(0) @binding(87) var coarser_optics: texture_3d<f32>;
+@group(0) @binding(90) var coarser_sun: texture_3d<f32>;
+@group(0) @binding(102) var coarser_sky: texture_3d<f32>;
 // Fluence and flux: of the sun's light, then of the sky's.
 @group(0) @binding(88) var<storage, read_write> moments_now: array<vec4f>;
 @group(0) @binding(89) var<storage, read_write> moments_before: array<vec4f>;
-@group(0) @binding(90) var<storage, read_write> coarser_moments: array<vec4f>;
-// Source functions of sun and sky, written to `sun_out` and `sky_out`. As textures, since lavapipe loads each word of a
-// buffer for each lane by itself.
-@group(0) @binding(91) var sun_sources: texture_3d<f32>;
-@group(0) @binding(101) var sky_sources: texture_3d<f32>;
+// Source functions of sun and sky, in pairs of half floats. A texture, since lavapipe loads each word of a buffer for
+// each lane by itself; a buffer where they are read in the dispatch that writes them.
+@group(0) @binding(91) var sources: texture_3d<u32>;
+@group(0) @binding(103) var sources_out: texture_storage_3d<rgba32uint, write>;
+@group(0) @binding(104) var<storage, read_write> few_sources: array<vec4u>;
 @group(0) @binding(92) var<storage, read_write> deposits: array<vec2f>; // scaled extinction, 1/m; scaled sunlight
-// Radiance by direction, of sun and sky: mean in each cell and the same of the coarser level, and what enters at
-// the sides, in pairs of half floats.
+// Radiance by direction, of sun and sky: mean in each cell, and what enters at the sides, in pairs of half floats.
 @group(0) @binding(93) var<storage, read_write> radiances: array<u32>;
-@group(0) @binding(94) var<storage, read_write> coarser_radiances: array<u32>;
 @group(0) @binding(95) var<storage, read_write> entering: array<u32>;
 @group(0) @binding(96) var<storage, read_write> balance: array<vec4f>; // factor on the sunlight of all cells
 @group(0) @binding(97) var sun_out: texture_storage_3d<rgba16float, write>;

@@ -11,11 +11,12 @@ fn level_place(cell: vec3f) -> vec3f {
     return vec3f(cell.xy - corner, cell.z) * level.cell;
 }
 
-// Point of a level in cells of the coarser one, whose middle is the same.
+// Point of a level in cells of the coarser one.
 fn coarser_cell(cell: vec3f) -> vec3f {
     let middle = 0.5 * vec2f(f32(level.across), f32(level.along));
     let middle_there = 0.5 * vec2f(f32(level.coarser_across), f32(level.coarser_along));
-    return vec3f((cell.xy - middle) * level.coarser_scale.xy + middle_there, cell.z * level.coarser_scale.z);
+    let across = (cell.xy - middle) * level.coarser_scale.xy + middle_there + level.coarser_offset;
+    return vec3f(across, cell.z * level.coarser_scale.z);
 }
 
 // Place of a point `p`, relative to the eye, in the field (`level_place`).
@@ -23,7 +24,7 @@ fn field_place(p: vec3f, altitude: f32) -> vec3f {
     if VOLUME {
         return p - frame.sky.volume_low + frame.sky.field_cell;
     }
-    return vec3f(on_chart(p, altitude) + frame.sky.field_eye, altitude - frame.sky.field_base);
+    return vec3f(on_chart(p, altitude) + frame.sky.field_levels[0].xy, altitude - frame.sky.field_base);
 }
 
 // Components of a direction at a point along the axes of the field; `mu` is its zenith cosine there.
@@ -47,18 +48,17 @@ fn field_level(q: vec3f) -> f32 {
 // Texture coordinates of a place in a level.
 fn field_texel(q: vec3f, which: f32) -> vec3f {
     let size = frame.sky.field_size.xyz;
-    let wide = exp2(which);
-    let halved = min(which, f32(frame.sky.field_halvings));
-    let rows = size.z * exp2(-halved);
-    let first_row = 2.0 * size.z * (1.0 - exp2(-halved)) + (which - halved) * rows;
+    let of_level = frame.sky.field_levels[u32(which)];
+    let rows = of_level.w;
     let height = frame.sky.field_cell.z * size.z;
-    var cell = vec3f(q.xy / (frame.sky.field_cell.xy * wide), q.z / height * rows);
+    let lag = of_level.xy - frame.sky.field_levels[0].xy;
+    var cell = vec3f((q.xy + lag) / (frame.sky.field_cell.xy * exp2(which)), q.z / height * rows);
     if !VOLUME {
         // Beyond the outermost level the field repeats.
         cell = vec3f(fract(cell.xy / size.xy + 0.5) * size.xy, cell.z);
     }
     cell = clamp(cell, vec3f(0.5), vec3f(size.xy, rows) - 0.5);
-    return (cell + vec3f(0.0, 0.0, first_row)) / vec3f(textureDimensions(field_sun));
+    return (cell + vec3f(0.0, 0.0, of_level.z)) / vec3f(textureDimensions(field_sun));
 }
 
 // Optical depth toward the sun at a place.
@@ -95,7 +95,8 @@ fn field_ground_at(q: vec2f) -> vec4f {
     let across = frame.sky.field_size.x;
     let wide = ceil(log2(max(frame.sky.field_base / frame.sky.field_cell.x, 1.0)));
     let which = min(max(field_level(vec3f(q, 0.0)), wide), frame.sky.field_size.w - 1.0);
-    let cell = fract(q / (frame.sky.field_cell.xy * exp2(which) * across) + 0.5) * across;
+    let lag = frame.sky.field_levels[u32(which)].xy - frame.sky.field_levels[0].xy;
+    let cell = fract((q + lag) / (frame.sky.field_cell.xy * exp2(which) * across) + 0.5) * across;
     let at = vec2f(cell.x, clamp(cell.y, 0.5, across - 0.5) + which * across);
     return textureSampleLevel(field_ground, repeat_sampler, at / vec2f(across, across * frame.sky.field_size.w), 0.0);
 }

@@ -1,9 +1,12 @@
 //! Shape of the light field: nested levels around the eye, or one level over the user's grid.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
-use crate::clipmap::{self, Origin};
-use crate::params::{Model, Params, Quality};
+use crate::chart::{from_chart, on_chart};
+use crate::clipmap::Origin;
+use crate::directions::sun_direction;
+use crate::params::{self, Model, Params, Quality};
+use crate::wind::Advection;
 
 /// Levels of the light field.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,15 +38,31 @@ const REACH: f32 = 50_000.0;
 /// Displacement of the clouds in m up to which the field is reused. A power of two (clipmap.rs).
 const CLOUD_STEP: f64 = 64.0;
 
-/// Whether a picture reads the light field.
-pub(crate) fn is_read(params: &Params) -> bool {
-    params.light.model == Model::Multiple && params.has_clouds()
-}
+/// Number of pixels below which a picture has half as many cells across, twice as wide, if it has at most `SMALL_CELLS`:
+/// its field takes a third of the time (docs/speed.md). From 320 x 180 on the whole field is solved.
+const SMALL_PICTURE: u64 = 57_600;
+const SMALL_CELLS: u32 = 64;
+/// Smallest number of cells across.
+const FEWEST_ACROSS: u32 = 16;
 
 impl FieldShape {
-    /// Shape for a sky. `altitude` is that of the eye in m.
-    pub fn new(params: &Params, quality: &Quality, altitude: f32) -> Self {
-        let across = quality.field_cells;
+    /// Shape for a picture of a number of pixels; None if it does not read the field. `altitude` is that of the eye in m.
+    pub fn new(params: &Params, quality: &Quality, altitude: f32, pixels: u64) -> Option<Self> {
+        if params.light.model != Model::Multiple || !params.has_clouds() {
+            return None;
+        }
+        let small = params.volume.is_none() && pixels < SMALL_PICTURE && quality.field_cells <= SMALL_CELLS;
+        let halved = u32::from(small && quality.field_cells >= 2 * FEWEST_ACROSS);
+        Some(Self::with_cells(
+            params,
+            quality.field_cells >> halved,
+            quality.field_cell * (1 << halved) as f32,
+            altitude,
+        ))
+    }
+
+    /// Shape with a number of cells across, and the finest cell in m.
+    fn with_cells(params: &Params, across: u32, cell: f32, altitude: f32) -> Self {
         if let Some(grid) = &params.volume {
             let [low, high] = grid.bounds();
             let side = (high - low).as_vec3();
@@ -64,7 +83,7 @@ impl FieldShape {
         let [base, top] = params.shell();
         let thick = top - base;
         // Cells double with the altitude of the eye, as pixels do.
-        let wide = quality.field_cell * (altitude.max(top) / 12_000.0).max(1.0).log2().floor().exp2();
+        let wide = cell * (altitude.max(top) / 12_000.0).max(1.0).log2().floor().exp2();
         let thinnest = if params.has_upper_clouds() {
             (params.clouds.top - params.clouds.base).min(params.upper_clouds.top - params.upper_clouds.base)
         } else {
@@ -100,10 +119,266 @@ impl FieldShape {
     }
 }
 
-/// Origin of the light field of a picture. A user-supplied grid does not move with time.
+/// Sky of a picture.
+#[derive(Clone, Copy)]
+pub(crate) struct Now<'a> {
+    pub params: &'a Params,
+    pub eye: DVec3,
+    /// Time in s.
+    pub time: f64,
+}
+
+/// Sky that a level of the field is solved for.
+#[derive(Clone, Debug)]
+pub(crate) struct Anchor {
+    /// Middle of the level on the chart, m.
+    pub place: DVec2,
+    /// Time of its clouds, s.
+    pub time: f64,
+    /// Its clouds and winds.
+    params: Params,
+    /// Unit vector toward its sun.
+    sun: DVec3,
+}
+
+/// Levels of the field that a picture needs solved.
+#[derive(Clone, Default)]
+pub(crate) enum Due {
+    /// Those of a still: all from nothing, unless they were solved for the same sky. A still does not depend on what was
+    /// rendered before it.
+    #[default]
+    Still,
+    /// All of an animation, from nothing.
+    Whole,
+    /// Some of an animation, from their own light. For each level: the sky that it is solved for, and what has changed.
+    Levels(Vec<(Anchor, Work)>),
+}
+
+impl Due {
+    /// Whether the field is that of an animation.
+    pub fn is_animated(&self) -> bool {
+        !matches!(self, Self::Still)
+    }
+}
+
+/// What is done for a level of an animation.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Work {
+    /// Number of sweeps; 0 if the level is up to date.
+    pub sweeps: u32,
+    /// Whether its clouds are new, besides its sun.
+    pub clouds: bool,
+}
+
+/// Lag up to which the finest level is not solved anew: angle of the sun in degrees. The n-th level may lag n times as
+/// far, as may its clouds.
+const SUN_LAG: f64 = 0.25;
+/// Sine of the elevation at which the sun may lag by that: at others in proportion, down to a part of it. At a low sun
+/// shadows are long.
+const LAG_SINE: f64 = 0.5;
+const LEAST_LAG: f64 = 0.4;
+/// Lag of the eye, as `SUN_LAG`: distance from the middle of the level in m.
+const EYE_LAG: f64 = 600.0;
+/// Lag of clouds that form, as `SUN_LAG`: change of the coverage, or fraction of the weather that differs.
+const CLOUD_CHANGE: f64 = 0.02;
+/// Sweeps of a level that follows a drifting sky, without acceleration: Chebyshev's iteration overshoots where the field
+/// is right already.
+const DRIFT_SWEEPS: u32 = 2;
+/// Lag in units of the above from which on a level is solved at once, by twice as many sweeps; up to then one level is
+/// solved per frame.
+const URGENT_LAG: f64 = 1.5;
+/// Lag in units of the above from which on the field is solved from nothing.
+const MOST_LAG: f64 = 8.0;
+
+/// Position and time on the grid of stills.
 pub(crate) fn origin(eye: DVec3, params: &Params, time: f64) -> Origin {
     if params.volume.is_some() {
-        return Origin { steps: [0; 3], place: glam::DVec2::ZERO, time: 0.0 };
+        return Origin { steps: [0; 3], place: DVec2::ZERO, time: 0.0 };
     }
-    clipmap::Origin::new(eye, params, time, CLOUD_STEP)
+    Origin::new(on_chart(eye, params).extend(0.0), params, time, CLOUD_STEP)
+}
+
+impl Anchor {
+    /// Anchor of the levels of a still.
+    pub fn still(eye: DVec3, params: &Params, time: f64) -> Self {
+        let Origin { place, time, .. } = origin(eye, params, time);
+        Self { place, time, params: params.clone(), sun: sun_direction(params) }
+    }
+
+    /// Middle of the level on the ground; of a grid, the origin of the world.
+    pub fn on_ground(&self, params: &Params) -> DVec3 {
+        from_chart(self.place, params)
+    }
+
+    /// Displacements of the clouds since.
+    fn advection(&self, now: &Now<'_>) -> Advection {
+        Advection::between((&self.params, self.time), (now.params, now.time))
+    }
+
+    /// Position of the eye relative to the middle of the level, after advection, on the chart, m.
+    pub fn eye(&self, now: &Now<'_>) -> DVec2 {
+        if now.params.volume.is_some() {
+            return DVec2::ZERO;
+        }
+        on_chart(now.eye, now.params) - self.place - self.advection(now).drift().truncate()
+    }
+
+    /// Lag of sun and of clouds behind a picture, in units of the lags allowed for the finest level. Infinite for another
+    /// sky.
+    fn lag(&self, now: &Now<'_>) -> [f64; 2] {
+        let (old, new) = (&self.params, now.params);
+        let planet = |params: &Params| params.atmosphere.planet_radius;
+        let clouds = params::Clouds { coverage: new.clouds.coverage, ..old.clouds.clone() };
+        let same = (clouds, &old.upper_clouds, &old.light, &old.volume)
+            == (new.clouds.clone(), &new.upper_clouds, &new.light, &new.volume);
+        if !same || planet(old) != planet(new) {
+            return [f64::INFINITY; 2];
+        }
+        let toward = sun_direction(new);
+        let allowed = SUN_LAG * (toward.z.abs() / LAG_SINE).clamp(LEAST_LAG, 1.0 / LAG_SINE);
+        let sun = self.sun.angle_between(toward).to_degrees() / allowed;
+        if new.volume.is_some() {
+            return [sun, 0.0];
+        }
+        let formed =
+            f64::from(new.weather_change(old)).max(f64::from((old.clouds.coverage - new.clouds.coverage).abs()));
+        let lags = [
+            self.advection(now).spread(new.has_upper_clouds()) / CLOUD_STEP,
+            formed / CLOUD_CHANGE,
+            self.eye(now).abs().max_element() / EYE_LAG,
+        ];
+        // Displacements beyond the range of f64 give NaN.
+        [sun, lags.into_iter().fold(0.0, |a, b| if b <= a { a } else { b })]
+    }
+
+    /// Anchor of a level with cells of a width in m for a picture: its middle moves with the clouds, and by whole cells
+    /// with the eye.
+    fn moved(&self, [across, along, _]: [f32; 3], now: &Now<'_>) -> Self {
+        let cell = DVec2::new(across.into(), along.into());
+        let drift = self.advection(now).drift().truncate();
+        let place = self.place + drift + (self.eye(now) / cell).round() * cell;
+        Self { place, time: now.time, params: now.params.clone(), sun: sun_direction(now.params) }
+    }
+}
+
+/// Levels that an animation needs solved, from their anchors, the finest first.
+pub(crate) fn due<'a>(anchors: impl Iterator<Item = &'a Anchor>, shape: &FieldShape, now: &Now<'_>) -> Due {
+    let lags: Vec<_> = anchors
+        .enumerate()
+        .map(|(level, anchor)| {
+            let [sun, clouds] = anchor.lag(now).map(|lag| lag / (level + 1) as f64);
+            (anchor, sun, clouds)
+        })
+        .collect();
+    let lag = |level: usize| lags[level].1.max(lags[level].2);
+    let worst = (0..lags.len()).max_by(|a, b| lag(*a).total_cmp(&lag(*b))).unwrap_or(0);
+    if !(lag(worst) < MOST_LAG) {
+        return Due::Whole;
+    }
+    let levels = lags.iter().enumerate().map(|(level, (anchor, _, clouds))| {
+        let urgent = lag(level) > URGENT_LAG;
+        if !urgent && (level != worst || lag(level) <= 1.0) {
+            return ((*anchor).clone(), Work::default());
+        }
+        let sweeps = DRIFT_SWEEPS * (1 + u32::from(urgent));
+        // With the sun the clouds are solved anew that would be due soon.
+        if *clouds > 0.5 {
+            return (anchor.moved(shape.cell(level as u32), now), Work { sweeps, clouds: true });
+        }
+        (Anchor { sun: sun_direction(now.params), ..(*anchor).clone() }, Work { sweeps, clouds: false })
+    });
+    Due::Levels(levels.collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SHAPE: FieldShape = FieldShape { cells: [64, 64, 20], cell: [100.0; 3], base: 0.0, levels: 5, halvings: 0 };
+
+    fn sky() -> Params {
+        let mut params = Params::default();
+        params.light.model = Model::Multiple;
+        params.sun.elevation = 40.0;
+        params
+    }
+
+    /// Levels due at an eye and a time, after a still of `before` at 0 s.
+    fn due_after(before: &Params, now: &Now<'_>) -> Due {
+        let anchors = vec![Anchor::still(DVec3::ZERO, before, 0.0); 5];
+        due(anchors.iter(), &SHAPE, now)
+    }
+
+    fn works(due: Due) -> Vec<Work> {
+        let Due::Levels(levels) = due else { panic!("all levels from nothing") };
+        levels.into_iter().map(|(_, work)| work).collect()
+    }
+
+    #[test]
+    fn a_sky_at_rest_needs_no_level() {
+        let params = sky();
+        let works = works(due_after(&params, &Now { params: &params, eye: DVec3::ZERO, time: 0.0 }));
+        assert!(works.iter().all(|work| work.sweeps == 0), "{works:?}");
+    }
+
+    #[test]
+    fn a_drifting_sun_needs_one_level_per_frame() {
+        let (before, mut after) = (sky(), sky());
+        after.sun.elevation += 0.3;
+        let works = works(due_after(&before, &Now { params: &after, eye: DVec3::ZERO, time: 0.0 }));
+        assert_eq!(works[0], Work { sweeps: DRIFT_SWEEPS, clouds: false });
+        assert!(works[1..].iter().all(|work| work.sweeps == 0), "{works:?}");
+    }
+
+    #[test]
+    fn jumps_solve_the_field_from_nothing() {
+        let before = sky();
+        let mut jumps = vec![sky(); 4];
+        jumps[0].sun.elevation = 60.0;
+        jumps[1].clouds.extinction *= 2.0;
+        jumps[2].clouds.coverage += 0.3;
+        jumps[3].weather.seed += 1;
+        for params in &jumps {
+            let due = due_after(&before, &Now { params, eye: DVec3::ZERO, time: 0.0 });
+            assert!(matches!(due, Due::Whole), "{params:?}");
+        }
+        let far = Now { params: &before, eye: DVec3::new(30e3, 0.0, 0.0), time: 0.0 };
+        assert!(matches!(due_after(&before, &far), Due::Whole));
+    }
+
+    /// Clouds that drift as one need no new light, and a level that follows the eye keeps its cells on the clouds.
+    #[test]
+    fn levels_move_with_the_clouds() {
+        let mut params = sky();
+        params.wind.speed = 20.0;
+        params.wind.weather_speed = 20.0;
+        params.wind.detail_speed = 20.0;
+        params.wind.weather_direction = params.wind.direction;
+        params.wind.detail_direction = params.wind.direction;
+        params.wind.updraft = 0.0;
+        let now = Now { params: &params, eye: DVec3::ZERO, time: 20.0 };
+        assert!(works(due_after(&params, &now)).iter().all(|work| work.sweeps == 0));
+        let now = Now { time: 40.0, ..now };
+        let Due::Levels(levels) = due_after(&params, &now) else { panic!() };
+        let (anchor, work) = &levels[0];
+        assert!(work.clouds && work.sweeps > 0, "{work:?}");
+        let before = Anchor::still(DVec3::ZERO, &params, 0.0);
+        let cells = (before.eye(&now) - anchor.eye(&now)) / 100.0;
+        assert!(cells.distance(cells.round()) < 1e-6 && cells.length() > 7.0, "{cells}");
+        assert!(anchor.eye(&now).abs().max_element() <= 50.0 + 1e-6);
+    }
+
+    /// Small pictures have half as many cells, twice as wide; grids and finer qualities have all.
+    #[test]
+    fn small_pictures_have_a_coarser_field() {
+        let cells = |params: &Params, quality: &Quality, pixels| {
+            let shape = FieldShape::new(params, quality, 0.0, pixels).expect("reads the field");
+            (shape.cells[0], shape.cell[0])
+        };
+        let balanced = Quality::named("balanced").expect("exists");
+        assert_eq!(cells(&sky(), &balanced, SMALL_PICTURE - 1), (32, 200.0));
+        assert_eq!(cells(&sky(), &balanced, SMALL_PICTURE), (64, 100.0));
+        let high = Quality::named("high").expect("exists");
+        assert_eq!(cells(&sky(), &high, 1), (128, 50.0));
+    }
 }

@@ -7,14 +7,15 @@ use std::f64::consts::{FRAC_PI_2, PI as PI64};
 use glam::{DVec2, DVec3, Vec3};
 
 use crate::camera::{Camera, Projection};
+use crate::chart::{chart_reach, on_chart};
 use crate::clipmap;
 use crate::directions::{compass, sun_direction};
-use crate::field::{self, FieldShape};
+use crate::field::{Anchor, FieldShape, Now};
 use crate::gpu::{Binding, Gpu};
 use crate::grid::SampleGrid;
 use crate::moon::MOON_RADIUS;
 use crate::params;
-use crate::params::{Edge, Model, Params, Phase, Quality};
+use crate::params::{Edge, Model, Params, Phase};
 use crate::scattering::{Split, droplet};
 use crate::shared::constants;
 use crate::uniforms::{Dispatch, Sky, View, uniform};
@@ -33,6 +34,8 @@ pub struct Frame {
     pub projection: Projection,
     /// Sample grid of the clouds.
     pub(crate) grid: SampleGrid,
+    /// Shape of the light field, if the picture reads it.
+    pub(crate) field: Option<FieldShape>,
     /// Whether there are high clouds.
     pub high_clouds: bool,
     /// Whether high clouds are embossed and the sun reaches any of them in sight.
@@ -61,9 +64,6 @@ constants! {
     const RAIN_STRETCH: f64 = 12.0;
     /// Width of clouds as a fraction of their spacing (`leap_scale`).
     const CLOUD_WIDTH: f32 = 0.5;
-    /// Minimum denominator of the chart's scale (`chart_reach`) in planet radii. Without it the chart would be
-    /// unbounded near the antipode of the origin. The minimum is reached 172 degrees from the origin.
-    const CHART_END: f64 = 0.01;
     /// Ratio of the tile sizes of the second and the first read of the texture of the high clouds. It is no ratio of
     /// small integers, so that the repetitions do not coincide.
     const BROAD: f32 = 3.2;
@@ -149,18 +149,6 @@ fn leap_scale(params: &Params) -> f32 {
         None => weather.scale,
     };
     params.weather_shares().into_iter().map(of_weather).fold(params.clouds.shape_scale, f32::min)
-}
-
-/// Denominator of the chart's scale at a point in m: the scale is the planet's diameter divided by it (chart.wgsl).
-fn chart_reach(at: DVec3, radius: f64) -> f64 {
-    let from_centre = at + DVec3::Z * radius;
-    (from_centre.length() + from_centre.z).max(CHART_END * radius)
-}
-
-/// Projection of a point to the chart of weather and noises: east and north of the origin in m (chart.wgsl).
-fn on_chart(at: DVec3, params: &Params) -> DVec2 {
-    let radius = f64::from(params.atmosphere.planet_radius);
-    2.0 * radius / chart_reach(at, radius) * at.truncate()
 }
 
 impl Frame {
@@ -596,23 +584,18 @@ impl Frame {
     }
 
     /// Sets shape, position and axes of the light field.
-    pub(crate) fn set_field(&mut self, eye: DVec3, params: &Params, time: f64, quality: &Quality) {
-        if !field::is_read(params) {
-            return;
-        }
-        let shape = FieldShape::new(params, quality, self.view.altitude);
+    pub(crate) fn set_field(&mut self, eye: DVec3, params: &Params, time: f64, shape: FieldShape) {
         let [across, along, rows] = shape.cells.map(|n| n as f32);
         self.sky.field_size = [across, along, rows, shape.levels as f32];
         self.sky.field_cell = shape.cell;
         self.sky.field_base = shape.base;
-        self.sky.field_halvings = shape.halvings;
+        self.field = Some(shape);
+        let anchor = Anchor::still(eye, params, time);
+        let eye_in_field = anchor.eye(&Now { params, eye, time });
+        self.set_field_levels(&shape, |_| eye_in_field);
         if params.volume.is_some() {
             return;
         }
-        let origin = field::origin(eye, params, time);
-        let drift = Advection::new(params, origin.time, time).drift().truncate();
-        let centre = on_chart(origin.place.extend(0.0), params);
-        self.sky.field_eye = (on_chart(eye, params) - centre - drift).as_vec2().to_array();
         // The chart is conformal: the image of a horizontal step is that step, turned and scaled.
         let zenith = Vec3::from_array(self.view.zenith).as_dvec3();
         let (a, b) = zenith.any_orthonormal_pair();
@@ -621,6 +604,15 @@ impl Frame {
         let axis = |x: f64, y: f64| (x * a + y * b).try_normalize().unwrap_or(a).as_vec3().to_array();
         self.sky.field_east = axis(of_a.x, of_b.x);
         self.sky.field_north = axis(of_a.y, of_b.y);
+    }
+
+    /// Sets the rows of the levels of the light field, and the position of the eye relative to the middle of each.
+    pub(crate) fn set_field_levels(&mut self, shape: &FieldShape, eye: impl Fn(usize) -> DVec2) {
+        for level in 0..shape.levels {
+            let eye = eye(level as usize).as_vec2();
+            let rows = [shape.rows_before(level), shape.rows(level)].map(|n| n as f32);
+            self.sky.field_levels[level as usize] = [eye.x, eye.y, rows[0], rows[1]];
+        }
     }
 
     /// Components of a direction at the eye along the axes of the light field: east, north and up.

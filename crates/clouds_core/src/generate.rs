@@ -26,6 +26,7 @@ fn python_type(field: &Field) -> String {
             format!("Literal[{}]", names.iter().map(|name| format!("{name:?}")).collect::<Vec<_>>().join(", "))
         }
         Type::Map(_) => "npt.NDArray[np.float32] | None".into(),
+        Type::Array(_) => unreachable!("is set by no user"),
     }
 }
 

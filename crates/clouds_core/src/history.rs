@@ -3,7 +3,7 @@
 use crate::camera::Camera;
 use crate::frame::Frame;
 use crate::gpu::Gpu;
-use crate::params::{self, Params};
+use crate::params::Params;
 use crate::scene_depth::{SceneDepth, SceneTextures};
 use crate::shot::Shot;
 use crate::targets::{Targets, Temporal};
@@ -35,7 +35,7 @@ impl Past {
             || (old.clouds.seed, old.clouds.noise) != (new.clouds.seed, new.clouds.noise)
             || (old.weather.extent, old.weather.edge) != (new.weather.extent, new.weather.edge)
             || old.weather.broad_extent != new.weather.broad_extent
-            || weather_change(old, new) > MAX_WEATHER_CHANGE
+            || new.weather_change(old) > MAX_WEATHER_CHANGE
             || old.volume != new.volume
             || (old.light.model, old.light.phase) != (new.light.model, new.light.phase)
             || old.atmosphere.planet_radius != new.atmosphere.planet_radius
@@ -59,15 +59,6 @@ impl Past {
 /// the sixteen frames in which every pixel is marched once. A change of weather within 30 s (thesis2018) stays below it
 /// at two frames per second or more.
 const MAX_WEATHER_CHANGE: f32 = 0.02;
-
-/// Fraction of the weather map that differs between two skies: 1 minus the weights that they have in common.
-fn weather_change(old: &Params, new: &Params) -> f32 {
-    let old = old.weather_shares();
-    let common = |(weather, share): (params::Weather, f32)| {
-        old.iter().find(|(before, _)| *before == weather).map_or(0.0, |(_, before)| before.min(share))
-    };
-    1.0 - new.weather_shares().into_iter().map(common).sum::<f32>()
-}
 
 /// Accumulator of a static shot without reprojection: the mean of its stills.
 pub(crate) struct Accumulator {

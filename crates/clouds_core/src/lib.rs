@@ -5,6 +5,7 @@
 
 mod blue_noise;
 pub mod camera;
+mod chart;
 mod clipmap;
 pub mod color;
 mod directions;

@@ -843,6 +843,15 @@ impl Params {
         shares.retain(|(_, share)| *share > 1e-6);
         shares
     }
+
+    /// Fraction of the weather map that differs from that of another sky: 1 minus the weights that they have in common.
+    pub fn weather_change(&self, before: &Self) -> f32 {
+        let before = before.weather_shares();
+        let common = |(weather, share): (Weather, f32)| {
+            before.iter().find(|(old, _)| *old == weather).map_or(0.0, |(_, old)| old.min(share))
+        };
+        1.0 - self.weather_shares().into_iter().map(common).sum::<f32>()
+    }
 }
 
 impl Weather {

@@ -3,6 +3,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use crate::field::Due;
 use crate::frame::Frame;
 use crate::gpu::Specialization;
 use crate::grid::TILE;
@@ -91,9 +92,10 @@ impl Plan {
         params: &'a Params,
         quality: &'a Quality,
         frame: &'a Frame,
+        field: Due,
     ) -> Inputs<'a> {
         let specialization = self.specialization.clone();
-        Inputs { params, quality, frame, eye: shot.camera.eye, time: shot.time, specialization }
+        Inputs { params, quality, frame, eye: shot.camera.eye, time: shot.time, specialization, field }
     }
 
     /// Number of rows in the buffers of a strip: its own and, with adaptive sampling, the first row of the next strip,

@@ -39,7 +39,7 @@ impl Quality {
                 min_transmittance: 0.002,
                 adaptive_threshold: 0.0,
                 path_samples: 256,
-                field_cells: 96,
+                field_cells: 128,
                 field_cell: 50.0,
                 relief_samples: 16,
                 ..balanced
@@ -47,7 +47,7 @@ impl Quality {
             "reference" => Self {
                 integrator: Integrator::Reference,
                 path_samples: 1024,
-                field_cells: 96,
+                field_cells: 128,
                 field_cell: 50.0,
                 ..balanced
             },

@@ -6,11 +6,12 @@ use glam::DVec3;
 
 use crate::camera::Camera;
 use crate::error::{Error, Result};
+use crate::field::{Due, FieldShape};
 use crate::frame::Frame;
 use crate::gpu::Linked;
+use crate::gpu::{Download, Recorder, Which, texture_rows};
 use crate::gpu::{Interrupt, Timings, check_fork};
 use crate::gpu::{Program, Specialization};
-use crate::gpu::{Recorder, Which};
 use crate::luts::light_field::{Cells, solve_cells};
 use crate::luts::lut::params_block;
 use crate::luts::{Inputs, shadow};
@@ -197,6 +198,37 @@ impl Renderer {
         Ok((moments, deposits, balance[0]))
     }
 
+    /// Textures of the light field of a shot, solved with every sweep made `times` times, or of the last frame of an
+    /// animation: optics, fluence and flux of the sun's light and of the sky's, four half floats per cell, x first, the
+    /// rows of the finest level first; and the number of texels along each axis. Tests call it.
+    pub fn light_field(
+        &mut self,
+        shot: &Shot<'_>,
+        times: u32,
+        animated: bool,
+        interrupt: Interrupt<'_>,
+    ) -> Result<([u32; 3], Vec<Vec<f32>>)> {
+        check_fork()?;
+        if !animated {
+            self.luts.light_field.more_sweeps = times - 1;
+            let recorded = self.record(shot, interrupt).and_then(|(rec, _)| rec.submit());
+            self.luts.light_field.more_sweeps = 0;
+            recorded?;
+        }
+        let Some(textures) = self.luts.light_field.textures(animated) else { return Ok(([0; 3], Vec::new())) };
+        let textures: Vec<_> = textures.iter().map(|view| view.texture().clone()).collect();
+        let mut rec = Recorder::new(&self.gpu, &mut self.timings, interrupt);
+        textures.iter().for_each(|texture| rec.download_texture(texture));
+        let downloads = rec.submit()?;
+        let half = |bytes: &[u8]| half::f16::from_le_bytes([bytes[0], bytes[1]]).to_f32();
+        let numbers = |(texture, download): (&wgpu::Texture, &Download)| {
+            texture_rows(texture, download.numbers()).flat_map(|row| row.chunks_exact(2)).map(half).collect()
+        };
+        let size = textures[0].size();
+        let size = [size.width, size.height, size.depth_or_array_layers];
+        Ok((size, textures.iter().zip(&downloads).map(numbers).collect()))
+    }
+
     /// Irradiance at world points in m on planes with a normal, by the light field: eight numbers per point, those of the
     /// sun's light that comes straight from it (three), those of all other light (three), and two without meaning.
     ///
@@ -241,11 +273,15 @@ impl Renderer {
     fn record<'a>(&'a mut self, shot: &Shot<'_>, interrupt: Interrupt<'a>) -> Result<(Recorder<'a>, Frame)> {
         let (mut frame, params) = shot.checked(self.size, &self.quality)?;
         frame.light_shafts = false;
+        // Answers do not depend on the size of pictures.
+        if let Some(shape) = FieldShape::new(&params, &self.quality, frame.view.altitude, u64::MAX) {
+            frame.set_field(shot.camera.eye, &params, shot.time, shape);
+        }
         self.timings = Timings::default();
         let mut rec = Recorder::new(&self.gpu, &mut self.timings, interrupt);
         let specialization = specialization::of_picture(&params, &self.quality, &frame, false);
         let (quality, eye, time) = (&self.quality, shot.camera.eye, shot.time);
-        let inputs = Inputs { params: &params, quality, frame: &frame, eye, time, specialization };
+        let inputs = Inputs { params: &params, quality, frame: &frame, eye, time, specialization, field: Due::Still };
         self.luts.update(&mut rec, &inputs)?;
         self.lut_memory = rec.held();
         Ok((rec, frame))

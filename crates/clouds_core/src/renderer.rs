@@ -6,6 +6,7 @@ use std::thread;
 
 use crate::blue_noise;
 use crate::error::{Error, Result};
+use crate::field::{Due, Now};
 use crate::frame::Frame;
 use crate::gpu::Recorder;
 use crate::gpu::{Gpu, Interrupt, Timings, check_fork};
@@ -134,8 +135,15 @@ impl Renderer {
         frame.set_motion(shot, &params, past.as_ref(), resized.as_ref());
 
         self.timings = Timings::default();
+        let field = match target {
+            Target::Still { .. } => Due::Still,
+            Target::Animation(_) => {
+                let now = Now { params: &params, eye: shot.camera.eye, time: shot.time };
+                self.luts.follow(&mut frame, past.is_some(), &now)
+            }
+        };
         let mut rec = Recorder::new(&self.gpu, &mut self.timings, interrupt);
-        self.luts.update(&mut rec, &plan.inputs(shot, &params, &self.quality, &frame))?;
+        self.luts.update(&mut rec, &plan.inputs(shot, &params, &self.quality, &frame, field))?;
         let pixels = frame.view.width * plan.max_rows();
         let scene =
             SceneTextures::fit(&mut self.scene_depth, &self.gpu, frame.scene.then(|| shot.scene_or_none()), pixels);

@@ -17,6 +17,8 @@ pub enum Type {
     Bool,
     /// Vector of two, three or four numbers.
     Vector(usize),
+    /// Array of vectors of four numbers, which no user sets.
+    Array(usize),
     /// One or two numbers in f64, whose precision a uniform does not hold. The GPU receives values derived from them,
     /// in `frame`.
     Exact(usize),
@@ -32,6 +34,7 @@ impl Type {
         match self {
             Self::F32 | Self::U32 | Self::Bool | Self::Choice(_) => 1,
             Self::Vector(n) => n,
+            Self::Array(n) => 4 * n,
             Self::Exact(_) | Self::Map(_) => 0,
         }
     }
@@ -40,7 +43,7 @@ impl Type {
     const fn align(self) -> usize {
         match self {
             Self::Vector(2) => 8,
-            Self::Vector(_) => 16,
+            Self::Vector(_) | Self::Array(_) => 16,
             _ => 4,
         }
     }
@@ -50,6 +53,7 @@ impl Type {
         match self {
             Self::F32 => "f32".into(),
             Self::Vector(n) => format!("vec{n}f"),
+            Self::Array(n) => format!("array<vec4f, {n}>"),
             Self::U32 | Self::Bool | Self::Choice(_) => "u32".into(),
             Self::Exact(_) | Self::Map(_) => unreachable!("is in no uniform"),
         }
@@ -139,6 +143,7 @@ impl Field {
             Type::Bool => "True or False".into(),
             Type::Vector(n) | Type::Exact(n) => format!("{n} numbers from {min} to {max}{unit}"),
             Type::Choice(names) => format!("one of {names:?}").replace(['[', ']'], ""),
+            Type::Array(n) => format!("{n} vectors"),
             Type::Map(channels) => {
                 let shape = if channels == 1 { "(H, W)".into() } else { format!("(H, W, {channels})") };
                 format!("None or a float array of shape {shape}, H and W from 1 to 8192, values from {min} to {max}")
@@ -291,6 +296,19 @@ impl<const N: usize> Typed for [f32; N] {
         for (out, v) in out.iter_mut().zip(self) {
             *out = v.to_bits();
         }
+    }
+}
+
+impl<const N: usize> Typed for [[f32; 4]; N] {
+    const TYPE: Type = Type::Array(N);
+    fn from_value(_value: &Value) -> Option<Self> {
+        None
+    }
+    fn to_value(&self) -> Value {
+        Value::None
+    }
+    fn write(&self, out: &mut [u32]) {
+        self.iter().zip(out.chunks_exact_mut(4)).for_each(|(row, out)| row.write(out));
     }
 }
 

@@ -9,7 +9,7 @@ use crate::luts::{large_scale_weather, light_field, majorant, multiscatter, nois
 use crate::params::{self, Model, Params, Quality};
 use crate::schema::{Block, wgsl_struct};
 use crate::uniforms::{Dispatch, FieldLevel, Sky, View};
-use crate::{blue_noise, camera, color, frame, gpu, grid, moon, scattering, scene_depth, specialization};
+use crate::{blue_noise, camera, chart, color, frame, gpu, grid, moon, scattering, scene_depth, specialization};
 
 pub use crate::gpu::{Linked, names};
 
@@ -87,6 +87,7 @@ fn constants_source() -> String {
         large_scale_weather::constants,
         camera::constants,
         color::constants,
+        chart::constants,
         frame::constants,
         grid::constants,
         light_field::constants,

@@ -2,6 +2,7 @@
 
 use crate::camera::Camera;
 use crate::error::{Error, Result};
+use crate::field::FieldShape;
 use crate::frame::Frame;
 use crate::gpu::check_fork;
 use crate::params::{Params, Quality};
@@ -57,7 +58,11 @@ impl<'a> Shot<'a> {
         let params = self.params.at(self.time);
         let mut frame = Frame::new(self.camera, &params, self.time, size);
         frame.view.most_rays = quality.most_rays();
-        frame.set_field(self.camera.eye, &params, self.time, quality);
+        if let Some(shape) =
+            FieldShape::new(&params, quality, frame.view.altitude, u64::from(size[0]) * u64::from(size[1]))
+        {
+            frame.set_field(self.camera.eye, &params, self.time, shape);
+        }
         frame.view.background = u32::from(self.background);
         frame.scene = self.scene.is_some();
         frame.view.scene_lit = u32::from(self.scene.is_some_and(|scene| scene.color.is_some()));

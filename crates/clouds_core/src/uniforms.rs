@@ -143,10 +143,9 @@ crate::params! {
         field_cell: [f32; 3] = [1.0; 3];
         /// Altitude of the base of the lowest row, m.
         field_base: f32 = 0.0;
-        /// Number of levels beyond the finest whose rows are twice as high as those of the level before.
-        field_halvings: u32 = 0;
-        /// Position of the eye relative to the middle of the light field, after advection, on the chart, m.
-        field_eye: [f32; 2] = [0.0; 2];
+        /// Levels of the light field: position of the eye relative to the middle of the level, after advection, on the
+        /// chart, m; first row in the textures of all levels; number of rows.
+        field_levels: [[f32; 4]; 8] = [[0.0; 4]; 8];
         /// Axes of the light field at the eye, in the world: east and north on the chart.
         field_east: [f32; 3] = [1.0, 0.0, 0.0];
         /// As `field_east`.
@@ -284,6 +283,8 @@ crate::params! {
         coarser_rows: u32 = 0;
         /// Cells of the coarser level per cell.
         coarser_scale: [f32; 3] = [1.0; 3];
+        /// Position of the middle relative to that of the coarser level, in cells of that.
+        coarser_offset: [f32; 2] = [0.0; 2];
         /// First row in the textures of all levels.
         first_row: u32 = 0;
         /// Unit vector toward the sun, in the axes of the field.
@@ -300,6 +301,8 @@ crate::params! {
         relaxation: f32 = 1.0;
         /// Weight of a step of Chebyshev's iteration.
         weight: f32 = 1.0;
+        /// Number of sweeps of a grid of few cells.
+        sweeps: u32 = 0;
     }
 }
 

@@ -191,6 +191,15 @@ impl Advection {
         self
     }
 
+    /// Largest displacement of a part of the clouds relative to their drift, m.
+    pub(crate) fn spread(&self, has_upper: bool) -> f64 {
+        let drift = self.drift().truncate();
+        let lower = [self.shape, self.detail, self.weather];
+        let upper = if has_upper { [self.upper, self.upper_detail] } else { [drift; 2] };
+        let parts = lower.into_iter().chain(upper);
+        parts.map(|part| (part - drift).length()).fold(self.rise.abs(), f64::max)
+    }
+
     /// Apparent displacement of the clouds in m: silhouettes move with the weather map, their billows with the base
     /// shapes. The mean of both is used.
     pub(crate) fn drift(&self) -> DVec3 {

@@ -618,6 +618,24 @@ impl Renderer {
         Ok((array(py, moments, &[z, y, x, 8])?, array(py, deposits, &[z, y, x, 2])?, factor))
     }
 
+    /// Textures of the light field, optics, sun's field and sky's field: shape (rows of all levels, y, x, 4).
+    fn light_field<'py>(
+        &self,
+        py: Python<'py>,
+        camera: &Camera,
+        params: &Bound<'py, PyAny>,
+        time: f64,
+        how: (u32, bool),
+    ) -> PyResult<Vec<Bound<'py, PyAny>>> {
+        let _inside = exit::enter(py);
+        let (camera, params): (_, Params) = (camera.0, params_from_python(params)?);
+        let (size, textures) = detached(py, |interrupt| {
+            lock(&self.core).light_field(&Shot::new(&camera, &params, time), how.0, how.1, interrupt)
+        })?;
+        let [x, y, z] = size.map(|n| n as usize);
+        textures.into_iter().map(|texture| array(py, texture, &[z, y, x, 4])).collect()
+    }
+
     /// Irradiance at points on planes with a normal: direct and diffuse, shape (N, 2, 3).
     fn irradiance<'py>(
         &self,

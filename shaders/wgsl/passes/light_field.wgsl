@@ -1,5 +1,5 @@
 // Bakes the light field: on each level of nested cells the extinction, the optical depth toward the sun, and the light
-// that clouds have scattered at least once out of the forward direction. A level is swept along 14 directions of a
+// that clouds have scattered at least once out of the forward direction. A level is swept along 18 directions of a
 // lattice; each sweep conserves energy in every cell. Levels are solved from the coarsest to the finest; what enters a
 // finer level at its sides is the radiance of the coarser one.
 //
@@ -304,14 +304,16 @@ struct Moments {
 // Source functions, linear in the direction: S(d) = S.x + S.yzw . d
 fn write_sources(index: u32, moments: Moments) {
     let c = frame.sky.split.w; // scaled albedo / 4 pi
-    let turn = 3.0 * frame.sky.turned_cosine;
+    let turn = vec4f(1.0, vec3f(3.0 * frame.sky.turned_cosine));
     let beam = deposits[index].y * balance[0].x;
-    let sun = moments.sun + vec4f(beam, -beam * level.sun);
-    let of_sun = c * sun * vec4f(1.0, vec3f(turn));
-    let of_sky = c * moments.sky * vec4f(1.0, vec3f(turn));
-    let at = cell_of(index);
-    textureStore(sun_out, at, nearest_half(of_sun));
-    textureStore(sky_out, at, nearest_half(of_sky));
+    let of_sun = c * turn * (moments.sun + vec4f(beam, -beam * level.sun));
+    let of_sky = c * turn * moments.sky;
+    let halves = vec4u(packed(of_sun.xy), packed(of_sun.zw), packed(of_sky.xy), packed(of_sky.zw));
+    if ALONE {
+        few_sources[index] = halves;
+    } else {
+        textureStore(sources_out, cell_of(index), halves);
+    }
 }
 
 // Nearest values that half floats hold. lavapipe rounds toward zero when it stores them: the loss of 2e-4 per
@@ -333,21 +335,21 @@ fn field_start(@builtin(global_invocation_id) id: vec3u) {
     }
     var moments = Moments(vec4f(0.0), vec4f(0.0));
     if level.coarser_rows > 0u {
-        let at = vec3f(cell_of(id.x)) + 0.5;
-        let there = coarser_size();
-        let corner = interpolation(coarser_cell(at), there);
-        for (var i = 0u; i < 8u; i++) {
-            let weight = corner_weight(corner, i);
-            let index = corner_index(corner, i, there.xy);
-            moments.sun += weight * coarser_moments[2u * index];
-            moments.sky += weight * coarser_moments[2u * index + 1u];
-        }
+        moments = coarser_moments(cell_of(id.x));
     }
     moments_now[2u * id.x] = moments.sun;
     moments_now[2u * id.x + 1u] = moments.sky;
     moments_before[2u * id.x] = moments.sun;
     moments_before[2u * id.x + 1u] = moments.sky;
     write_sources(id.x, moments);
+}
+
+fn coarser_moments(at: vec3i) -> Moments {
+    let uvw = level_texel(coarser_cell(vec3f(at) + 0.5), vec3f(coarser_size()));
+    return Moments(
+        textureSampleLevel(coarser_sun, clamp_sampler, uvw, 0.0),
+        textureSampleLevel(coarser_sky, clamp_sampler, uvw, 0.0),
+    );
 }
 
 // Trilinear interpolation between middles of cells, clamped at the faces.
@@ -391,7 +393,8 @@ fn open_radiance(d: u32) -> vec2f {
     return vec2f(0.0, select(0.0, 1.0, lattice_step(d).z < 0));
 }
 
-// Radiance that enters at the sides: of the coarser level, half a path through a cell before its middle.
+// Radiance that enters at the sides: of the coarser level, whose `radiances` they are, half a path through a cell
+// before its middle.
 @compute @workgroup_size(64)
 fn field_entering(@builtin(global_invocation_id) id: vec3u) {
     let d = id.y;
@@ -416,7 +419,7 @@ fn field_entering(@builtin(global_invocation_id) id: vec3u) {
         radiance = vec2f(0.0);
         for (var i = 0u; i < 8u; i++) {
             let cells = there.x * there.y * there.z;
-            let other = coarser_radiances[d * cells + corner_index(corner, i, there.xy)];
+            let other = radiances[d * cells + corner_index(corner, i, there.xy)];
             radiance += corner_weight(corner, i) * unpack2x16float(other);
         }
     }
@@ -425,8 +428,14 @@ fn field_entering(@builtin(global_invocation_id) id: vec3u) {
 
 // Source functions of a cell in a direction.
 fn source_toward(at: vec3i, direction: vec3f) -> vec2f {
-    let sun = textureLoad(sun_sources, at, 0);
-    let sky = textureLoad(sky_sources, at, 0);
+    var halves: vec4u;
+    if ALONE {
+        halves = few_sources[cell_index(at)];
+    } else {
+        halves = textureLoad(sources, at, 0);
+    }
+    let sun = vec4f(unpack2x16float(halves.x), unpack2x16float(halves.y));
+    let sky = vec4f(unpack2x16float(halves.z), unpack2x16float(halves.w));
     return vec2f(sun.x + dot(sun.yzw, direction), sky.x + dot(sky.yzw, direction));
 }
 
@@ -465,11 +474,14 @@ fn source_slope(before: vec2f, here: vec2f, next: vec2f, has_before: bool, has_n
 // Every cell lies on one line.
 @compute @workgroup_size(32, 2, 1)
 fn field_sweep_down(@builtin(global_invocation_id) id: vec3u) {
-    let size = vec3i(level_size());
-    if any(vec2i(id.xy) >= size.xy) || id.z >= select(STEEP, DIRECTIONS, level.tilt_crosses > 0u) {
-        return;
+    if all(id < vec3u(level.across, level.along, select(STEEP, DIRECTIONS, level.tilt_crosses > 0u))) {
+        follow_down(id.z, vec2i(id.xy));
     }
-    let d = id.z;
+}
+
+// Follows a direction from row to row, from a cell at the top or at the base.
+fn follow_down(d: u32, begin: vec2i) {
+    let size = vec3i(level_size());
     let step = lattice_step(d);
     let direction = lattice_direction(d);
     let length = lattice_length(d);
@@ -478,7 +490,7 @@ fn field_sweep_down(@builtin(global_invocation_id) id: vec3u) {
     // Cells by which the line moves per row.
     let shift = abs(direction.xy) / abs(direction.z) * level.cell.z / level.cell.xy;
     var radiance = open_radiance(d);
-    var at = vec3i(vec2i(id.xy), select(size.z - 1, 0, step.z > 0));
+    var at = vec3i(begin, select(size.z - 1, 0, step.z > 0));
     var moved = vec2f(0.0);
     var before = vec2f(0.0);
     var here = source_toward(at, direction);
@@ -586,29 +598,72 @@ fn line_cell(line: u32, place: i32, row: i32, in_x: bool) -> vec3i {
 // Moments of a sweep, and the step of Chebyshev's iteration with them.
 @compute @workgroup_size(64)
 fn field_gather(@builtin(global_invocation_id) id: vec3u) {
-    let size = level_size();
-    let cells = size.x * size.y * size.z;
-    if id.x >= cells {
-        return;
+    if id.x < level.across * level.along * level.rows {
+        gather(id.x, level.weight);
     }
+}
+
+// The buffers of both moments exchange their roles after each step.
+fn gather(index: u32, weight: f32) {
+    let cells = level.across * level.along * level.rows;
     var swept = Moments(vec4f(0.0), vec4f(0.0));
     for (var d = 0u; d < DIRECTIONS; d++) {
-        let weight = lattice_weight(d);
-        let radiance = weight * unpack2x16float(radiances[d * cells + id.x]);
+        let radiance = lattice_weight(d) * unpack2x16float(radiances[d * cells + index]);
         let moment = vec4f(1.0, lattice_direction(d));
         swept.sun += radiance.x * moment;
         swept.sky += radiance.y * moment;
     }
-    let now = Moments(moments_now[2u * id.x], moments_now[2u * id.x + 1u]);
-    let before = Moments(moments_before[2u * id.x], moments_before[2u * id.x + 1u]);
+    let now = Moments(moments_now[2u * index], moments_now[2u * index + 1u]);
+    let before = Moments(moments_before[2u * index], moments_before[2u * index + 1u]);
     let next = Moments(
-        before.sun + level.weight * (now.sun + level.relaxation * (swept.sun - now.sun) - before.sun),
-        before.sky + level.weight * (now.sky + level.relaxation * (swept.sky - now.sky) - before.sky),
+        before.sun + weight * (now.sun + level.relaxation * (swept.sun - now.sun) - before.sun),
+        before.sky + weight * (now.sky + level.relaxation * (swept.sky - now.sky) - before.sky),
     );
-    // The buffers of both exchange their roles after this.
-    moments_before[2u * id.x] = next.sun;
-    moments_before[2u * id.x + 1u] = next.sky;
-    write_sources(id.x, next);
+    moments_before[2u * index] = select(next.sun, now.sun, ALONE);
+    moments_before[2u * index + 1u] = select(next.sky, now.sky, ALONE);
+    if ALONE {
+        moments_now[2u * index] = next.sun;
+        moments_now[2u * index + 1u] = next.sky;
+    }
+    write_sources(index, next);
+}
+
+// All sweeps of a grid of few cells, by one workgroup: as dispatches of their own most of their time would be that of
+// launching them.
+@compute @workgroup_size(256)
+fn field_sweep_few(@builtin(local_invocation_id) id: vec3u) {
+    let size = level_size();
+    let lines = size.x * size.y * DIRECTIONS;
+    let cells = size.x * size.y * size.z;
+    let mu = level.relaxation - 1.0;
+    var weight = 1.0;
+    for (var sweep = 0u; sweep < level.sweeps; sweep++) {
+        for (var first = 0u; first < lines; first += 256u) {
+            let line = first + id.x;
+            if line < lines {
+                let column = line % (size.x * size.y);
+                follow_down(line / (size.x * size.y), vec2i(vec2u(column % size.x, column / size.x)));
+            }
+        }
+        storageBarrier();
+        for (var first = 0u; first < cells; first += 256u) {
+            if first + id.x < cells {
+                gather(first + id.x, weight);
+            }
+        }
+        storageBarrier();
+        weight = 1.0 / (1.0 - select(0.25 * weight, 0.5, sweep == 0u) * mu * mu);
+    }
+}
+
+// Stores the solution of a level.
+@compute @workgroup_size(4, 4, 4)
+fn field_keep(@builtin(global_invocation_id) id: vec3u) {
+    if all(id < level_size()) {
+        let index = cell_index(vec3i(id));
+        textureStore(sun_out, id, nearest_half(moments_now[2u * index]));
+        textureStore(sky_out, id, nearest_half(moments_now[2u * index + 1u]));
+    }
 }
 
 // Stores a level in the textures of all levels. Toward its rim a level blends into the coarser one, so that reads need
@@ -619,27 +674,18 @@ fn field_store(@builtin(global_invocation_id) id: vec3u) {
     if any(id >= size) {
         return;
     }
-    let index = cell_index(vec3i(id));
     var optics = textureLoad(level_optics, id, 0);
-    var moments = Moments(moments_now[2u * index], moments_now[2u * index + 1u]);
+    var moments = Moments(textureLoad(level_sun, id, 0), textureLoad(level_sky, id, 0));
     if level.sides == SIDES_COARSER {
         let at = vec3f(id) + 0.5;
-        let there = coarser_size();
-        let corner = interpolation(coarser_cell(at), there);
         let middle = 0.5 * vec2f(size.xy);
         let away = abs(at.xy - middle) / middle;
         let share = smoothstep(BLEND, 1.0, max(away.x, away.y));
-        moments.sun *= 1.0 - share;
-        moments.sky *= 1.0 - share;
-        for (var i = 0u; i < 8u; i++) {
-            let weight = share * corner_weight(corner, i);
-            let other = corner_index(corner, i, there.xy);
-            moments.sun += weight * coarser_moments[2u * other];
-            moments.sky += weight * coarser_moments[2u * other + 1u];
-        }
-        let uvw = level_texel(coarser_cell(at), vec3f(there));
-        let beyond = textureSampleLevel(coarser_optics, clamp_sampler, uvw, 0.0);
-        optics = mix(optics, beyond, share);
+        let coarser = coarser_moments(vec3i(id));
+        moments.sun = mix(moments.sun, coarser.sun, share);
+        moments.sky = mix(moments.sky, coarser.sky, share);
+        let uvw = level_texel(coarser_cell(at), vec3f(coarser_size()));
+        optics = mix(optics, textureSampleLevel(coarser_optics, clamp_sampler, uvw, 0.0), share);
     }
     let out = vec3u(id.xy, level.first_row + id.z);
     textureStore(volume_out, out, optics);

@@ -321,6 +321,12 @@ impl Gpu {
         self.allocate(label, size, 1, dimension, wgpu::TextureFormat::Rgba16Float, storage)
     }
 
+    /// Storage texture of four 32-bit words per texel.
+    pub(crate) fn words_3d(&self, label: &str, size: [u32; 3]) -> wgpu::Texture {
+        let (dimension, storage) = (wgpu::TextureDimension::D3, wgpu::TextureUsages::STORAGE_BINDING);
+        self.allocate(label, size, 1, dimension, wgpu::TextureFormat::Rgba32Uint, storage)
+    }
+
     /// 2D texture of one or two channels. It is filled from the host or from a buffer, as not every adapter supports
     /// stores to its format.
     pub(crate) fn flat(&self, label: &str, [width, height]: [u32; 2], format: wgpu::TextureFormat) -> wgpu::Texture {

@@ -46,6 +46,13 @@ const MAX_TIMED: usize = 2048;
 #[derive(Clone, Default)]
 pub(crate) struct Token(Arc<AtomicBool>);
 
+impl Token {
+    /// Whether the recording has been submitted.
+    pub fn is_submitted(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
+    }
+}
+
 /// List filled by kernels; the entries are in another buffer.
 pub(crate) struct List<'a> {
     pub count: &'a wgpu::Buffer,
@@ -155,7 +162,7 @@ impl<'a> Recorder<'a> {
     /// Whether the results recorded with a token are available to further dispatches: submitted already, or earlier in
     /// this recording.
     pub fn has(&self, token: &Token) -> bool {
-        token.0.load(Ordering::Relaxed) || Arc::ptr_eq(&token.0, &self.token.0)
+        token.is_submitted() || Arc::ptr_eq(&token.0, &self.token.0)
     }
 
     /// Token of the current recording.

@@ -1,15 +1,15 @@
 //! Light field: light in clouds of every order of scattering, solved on nested levels (passes/light_field).
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::lut::{Inputs, Lut, view};
 use super::volume::Grid;
 use crate::camera::Camera;
 use crate::clipmap::{Casters, casters};
 use crate::error::Result;
-use crate::field::{self, FieldShape};
+use crate::field::{self, Anchor, Due, FieldShape, Now, Work};
 use crate::frame::Frame;
-use crate::gpu::{Binding, Bindings, Recorder};
+use crate::gpu::{Binding, Bindings, Gpu, Recorder, Token};
 use crate::params;
 use crate::scattering::{FORWARD_SIZE, forward_table};
 use crate::shared::constants;
@@ -33,28 +33,56 @@ const TILT: f32 = 0.12;
 /// have slow modes: at an optical depth of 80, a slab's transmitted light is half of the right value after 42 sweeps.
 /// Grids with few columns know them at little cost.
 const CASCADE_SWEEPS: [u32; 5] = [8, 10, 20, 50, 150];
-/// Sweeps of the finer levels: of the others, and of the finest.
+/// Sweeps of the finer levels: of the others, and of the finest. Of a low sun, whose light comes from afar: at 5 degrees
+/// the finest level is 9 % from the converged solution after the first numbers, and 6 % after the second.
 const LEVEL_SWEEPS: [u32; 2] = [4, 3];
+const LOW_SUN_SWEEPS: [u32; 2] = [7, 4];
+/// Sine of the sun's elevation, 15 degrees, below which it is low.
+const LOW_SUN: f32 = 0.2588;
 /// Upper bound of the spectrum of a sweep that Chebyshev's iteration assumes. Eigenvalues are complex: 0.93 is the
 /// limit of stability, and 0.97 diverges.
 const SPECTRUM: f64 = 0.9;
 /// Cells that a ray toward the sun crosses in a level before it reads the coarser one.
-const SUN_CELLS: u32 = 12;
+const SUN_CELLS: u32 = 24;
 /// Largest number of cells that it crosses in a level without a coarser one.
 const MOST_SUN_CELLS: f32 = 512.0;
 
-/// Key of the field: shadow casters, light, planet and grid, snapped position and time, shape, whether the sun is up.
-type Key = (Casters, params::Light, (f32, Grid), [i64; 3], FieldShape, bool);
+/// Largest number of cells of a grid that one workgroup sweeps, and of iterations of its loops. lavapipe ends the loops
+/// of a kernel after 65,535 iterations in all.
+const FEW_CELLS: u64 = 1024;
+const FEW_ITERATIONS: u64 = 50_000;
+/// Invocations of a workgroup (`field_sweep_few`).
+const FEW_GROUP: u64 = 256;
+
+/// Key of the field of a still: shadow casters, light, planet and grid, snapped position and time, shape, whether the
+/// sun is up and the sweeps.
+type Key = (Casters, params::Light, (f32, Grid), [i64; 3], FieldShape, (bool, u32));
 
 /// Light field on the GPU.
 #[derive(Default)]
 pub(crate) struct LightField {
-    lut: Lut<Key, Field>,
+    still: Lut<Key, Textures>,
+    animated: Option<(Solved, Token)>,
     forward: Lut<params::Light>,
+    /// Number of times that all sweeps are made more often, less one.
+    pub more_sweeps: u32,
 }
 
-/// Textures of optics, of the sun's field and of the sky's field, and the light on the ground.
-type Field = ([wgpu::TextureView; 3], wgpu::TextureView);
+/// Textures of all levels: optics, sun's field and sky's field, and the light on the ground.
+#[derive(Clone)]
+struct Textures {
+    levels: [wgpu::TextureView; 3],
+    ground: wgpu::TextureView,
+}
+
+/// Field of an animation, whose levels follow the sky.
+struct Solved {
+    shape: FieldShape,
+    textures: Textures,
+    /// Levels, from the finest.
+    levels: Vec<(Anchor, Solution)>,
+    scratch: Scratch,
+}
 
 /// Grid of cells that is solved, and how its solution is obtained.
 #[derive(Clone, Debug)]
@@ -68,23 +96,104 @@ struct Stage {
 }
 
 /// Solution of a stage.
+#[derive(Clone)]
 struct Solution {
     stage: Stage,
+    densities: wgpu::TextureView,
     optics: wgpu::TextureView,
-    moments: wgpu::Buffer,
-    radiances: wgpu::Buffer,
+    sun: wgpu::TextureView,
+    sky: wgpu::TextureView,
+    /// Radiance that enters at the sides.
+    entering: wgpu::Buffer,
+}
+
+/// Buffers that the stages share while they are solved.
+struct Scratch {
+    moments: [wgpu::Buffer; 2],
     deposits: wgpu::Buffer,
+    radiances: wgpu::Buffer,
     balance: wgpu::Buffer,
+}
+
+impl Scratch {
+    fn new(gpu: &Gpu, stages: &[Stage]) -> Self {
+        let most = stages.iter().map(Stage::count).max().unwrap_or(1);
+        Self {
+            moments: ["moments", "moments"].map(|label| gpu.buffer(label, 32 * most)),
+            deposits: gpu.buffer("deposits", 8 * most),
+            radiances: gpu.buffer("radiances", 4 * DIRECTIONS * most),
+            balance: gpu.buffer("balance", 16),
+        }
+    }
+
+    fn bindings(&self) -> Bindings {
+        vec![
+            ("moments_now", (&self.moments[0]).into()),
+            ("moments_before", (&self.moments[1]).into()),
+            ("deposits", (&self.deposits).into()),
+            ("radiances", (&self.radiances).into()),
+            ("balance", (&self.balance).into()),
+        ]
+    }
+}
+
+impl Solution {
+    /// Solution of a stage, not solved yet.
+    fn new(gpu: &Gpu, stage: Stage) -> Self {
+        let texture = |label| view(&gpu.texture_3d(label, stage.cells));
+        let [densities, optics] = ["densities", "optics"].map(texture);
+        let [sun, sky] = ["sun", "sky"].map(texture);
+        let entering = gpu.buffer("entering", 4 * DIRECTIONS * stage.rim());
+        Self { densities, optics, sun, sky, entering, stage }
+    }
+
+    /// Bindings as the level that is solved.
+    fn as_level(&self) -> Bindings {
+        vec![
+            ("level_optics", (&self.optics).into()),
+            ("level_sun", (&self.sun).into()),
+            ("level_sky", (&self.sky).into()),
+            ("entering", (&self.entering).into()),
+        ]
+    }
+
+    /// Bindings as the level around it.
+    fn as_coarser(&self) -> Bindings {
+        vec![
+            ("coarser_optics", (&self.optics).into()),
+            ("coarser_sun", (&self.sun).into()),
+            ("coarser_sky", (&self.sky).into()),
+        ]
+    }
 }
 
 impl Stage {
     fn count(&self) -> u64 {
         self.cells.iter().map(|n| u64::from(*n)).product()
     }
+
+    /// Number of cells at one side across and one along.
+    fn rim(&self) -> u64 {
+        u64::from((self.cells[0] + self.cells[1]) * self.cells[2])
+    }
+
+    /// Whether the tilted directions cross a row in less than a cell.
+    fn is_flat(&self) -> bool {
+        TILT * self.cell[0].min(self.cell[1]) > self.cell[2]
+    }
+
+    /// Whether one workgroup makes all sweeps.
+    fn is_small(&self) -> bool {
+        let [x, y, z] = self.cells.map(u64::from);
+        let rounds = (x * y * DIRECTIONS).div_ceil(FEW_GROUP) * (z + 1)
+            + self.count().div_ceil(FEW_GROUP) * (DIRECTIONS + 1)
+            + 1;
+        self.is_flat() && self.count() <= FEW_CELLS && u64::from(self.sweeps) * rounds < FEW_ITERATIONS
+    }
 }
 
 /// Stages of a field, from the coarsest.
-fn stages(shape: &FieldShape, sides: u32) -> Vec<Stage> {
+fn stages(shape: &FieldShape, sides: u32, level_sweeps: [u32; 2]) -> Vec<Stage> {
     let last = shape.levels - 1;
     let outermost = Stage {
         cells: [shape.cells[0], shape.cells[1], shape.rows(last)],
@@ -114,7 +223,7 @@ fn stages(shape: &FieldShape, sides: u32) -> Vec<Stage> {
     cascade.reverse();
     for level in (0..last).rev() {
         let cells = [shape.cells[0], shape.cells[1], shape.rows(level)];
-        let sweeps = LEVEL_SWEEPS[usize::from(level == 0)];
+        let sweeps = level_sweeps[usize::from(level == 0)];
         cascade.push(Stage { cells, cell: shape.cell(level), sides: SIDES_COARSER, sweeps, level: Some(level) });
     }
     cascade
@@ -144,96 +253,105 @@ struct Sun {
     bend: f32,
 }
 
-/// Densities of a stage.
-enum Densities {
-    /// Baked from the clouds.
-    Baked,
-    /// Given as a texture.
-    Given(wgpu::TextureView),
+/// How a stage is solved.
+struct Task<'a> {
+    sun: &'a Sun,
+    /// Level around it, and the position of the middle relative to the middle of that, m.
+    coarser: Option<(&'a Solution, DVec2)>,
+    /// Own field to begin with instead of that of the level around it: the displacement of the middle since, m, and the
+    /// number of sweeps.
+    moved: Option<(DVec2, u32)>,
+    /// Whether the densities are baked.
+    bakes: bool,
+    /// Uniform blocks of a frame at the middle of the field.
+    frame: &'a Bindings,
+    scratch: &'a Scratch,
 }
 
-/// Solves a stage.
-fn solve(
-    rec: &mut Recorder<'_>,
-    stage: Stage,
-    sky_of: &Sun,
-    coarser: Option<&Solution>,
-    frame: &Bindings,
-    densities: Densities,
-) -> Solution {
-    let count = stage.count();
-    let optics = view(&rec.gpu.texture_3d("optics", stage.cells));
-    let [mut now, mut before] = ["moments", "moments"].map(|label| rec.gpu.buffer(label, 32 * count));
-    let [sun, sky] = ["sun_sources", "sky_sources"].map(|label| view(&rec.gpu.texture_3d(label, stage.cells)));
-    let deposits = rec.gpu.buffer("deposits", 8 * count);
-    let radiances = rec.gpu.buffer("radiances", 4 * DIRECTIONS * count);
-    let rim = u64::from((stage.cells[0] + stage.cells[1]) * stage.cells[2]);
-    let entering = rec.gpu.buffer("entering", 4 * DIRECTIONS * rim);
-    let balance = rec.gpu.buffer("balance", 16);
-    let level = level_block(&stage, sky_of, coarser.map(|coarser| &coarser.stage));
-    let fallback = now.clone();
+/// Solves a stage. Returns the buffer of fluence and flux.
+fn solve<'a>(rec: &mut Recorder<'_>, solution: &Solution, task: &Task<'a>) -> &'a wgpu::Buffer {
+    let Task { sun, coarser, scratch, .. } = *task;
+    let stage = &solution.stage;
+    let around = coarser.map(|(coarser, offset)| (&coarser.stage, offset));
+    let level = level_block(stage, sun, around);
+    let count = stage.count() as u32;
+    // Without a level around it nothing of that is read.
+    let none = || Solution { optics: solution.densities.clone(), ..solution.clone() }.as_coarser();
+    let coarser_in = coarser.map_or_else(none, |(coarser, _)| coarser.as_coarser());
     let bindings = |level: &FieldLevel, more: Bindings| -> Bindings {
-        let mut bindings = more;
-        bindings.extend([
-            ("level", uniform(&[level])),
-            ("deposits", (&deposits).into()),
-            ("radiances", (&radiances).into()),
-            ("entering", (&entering).into()),
-            ("balance", (&balance).into()),
-        ]);
-        if let Some(coarser) = coarser {
-            bindings.push(("coarser_moments", (&coarser.moments).into()));
-            bindings.push(("coarser_radiances", (&coarser.radiances).into()));
-            bindings.push(("coarser_optics", (&coarser.optics).into()));
-        } else {
-            // Not read without a coarser level.
-            bindings.push(("coarser_moments", (&fallback).into()));
-            bindings.push(("coarser_radiances", (&entering).into()));
-        }
-        bindings.extend(frame.iter().cloned());
-        bindings
+        let own = vec![("level", uniform(&[level]))];
+        [own, more, scratch.bindings(), solution.as_level(), coarser_in.clone(), task.frame.clone()].concat()
     };
     let [x, y, z] = stage.cells;
-    let densities = match densities {
-        Densities::Given(densities) => densities,
-        Densities::Baked => {
-            let densities = view(&rec.gpu.texture_3d("densities", stage.cells));
-            let out = vec![("volume_out", (&densities).into())];
-            rec.dispatch(("light_field", "field_density"), bindings(&level, out), stage.cells);
-            densities
-        }
-    };
-    let own: Bindings = vec![("level_optics", (&densities).into()), ("volume_out", (&optics).into())];
-    rec.dispatch(("light_field", "field_depth"), bindings(&level, own), stage.cells);
-    let optics_in = || vec![("level_optics", Binding::from(&optics))];
-    rec.dispatch(("light_field", "field_beam"), bindings(&level, optics_in()), [count as u32, 1, 1]);
-    rec.dispatch(("light_field", "field_balance"), bindings(&level, optics_in()), [256, 1, 1]);
-    rec.dispatch(("light_field", "field_entering"), bindings(&level, vec![]), [rim as u32, DIRECTIONS as u32, 1]);
-    let moments = |now: &wgpu::Buffer, before: &wgpu::Buffer| -> Bindings {
-        let sources = [("sun_out", (&sun).into()), ("sky_out", (&sky).into())];
-        [vec![("moments_now", now.into()), ("moments_before", before.into())], sources.to_vec()].concat()
-    };
-    let sources = || -> Bindings {
-        let optics = ("level_optics", (&optics).into());
-        vec![("sun_sources", (&sun).into()), ("sky_sources", (&sky).into()), optics]
-    };
-    rec.dispatch(("light_field", "field_start"), bindings(&level, moments(&now, &before)), [count as u32, 1, 1]);
-    for [relaxation, weight] in chebyshev(stage.sweeps) {
-        let down = if level.tilt_crosses > 0 { DIRECTIONS as u32 } else { STEEP };
-        rec.dispatch(("light_field", "field_sweep_down"), bindings(&level, sources()), [x, y, down]);
-        if level.tilt_crosses == 0 {
-            let size = [x.max(y), z, DIRECTIONS as u32 - STEEP];
-            rec.dispatch(("light_field", "field_sweep_along"), bindings(&level, sources()), size);
-        }
-        let step = FieldLevel { relaxation, weight, ..level.clone() };
-        rec.dispatch(("light_field", "field_gather"), bindings(&step, moments(&now, &before)), [count as u32, 1, 1]);
-        std::mem::swap(&mut now, &mut before);
+    if task.bakes {
+        let out = vec![("volume_out", (&solution.densities).into())];
+        rec.dispatch(("light_field", "field_density"), bindings(&level, out), stage.cells);
     }
-    Solution { stage, optics, moments: now, radiances, deposits, balance }
+    let own: Bindings = vec![("level_optics", (&solution.densities).into()), ("volume_out", (&solution.optics).into())];
+    rec.dispatch(("light_field", "field_depth"), bindings(&level, own), stage.cells);
+    rec.dispatch(("light_field", "field_beam"), bindings(&level, vec![]), [count, 1, 1]);
+    rec.dispatch(("light_field", "field_balance"), bindings(&level, vec![]), [256, 1, 1]);
+    if stage.sides == SIDES_OPEN {
+        let size = [stage.rim() as u32, DIRECTIONS as u32, 1];
+        rec.dispatch(("light_field", "field_entering"), bindings(&level, vec![]), size);
+    }
+    // The field to begin with: that of the level around it, or its own.
+    let (start, from) = match task.moved {
+        Some((moved, _)) => (level_block(stage, sun, Some((stage, moved))), solution.as_coarser()),
+        None => (level.clone(), vec![]),
+    };
+    let few = stage.is_small();
+    let words = |size| view(&rec.gpu.words_3d("sources", size));
+    let sources = words(if few { [1; 3] } else { stage.cells });
+    // Bound to the kernel that reads and writes the buffer instead.
+    let unread = words([1; 3]);
+    let few_sources = rec.gpu.buffer("few_sources", if few { 16 * u64::from(count) } else { 16 });
+    let mut moments = scratch.moments.each_ref();
+    let stepped = |moments: [&wgpu::Buffer; 2]| -> Bindings {
+        vec![
+            ("moments_now", moments[0].into()),
+            ("moments_before", moments[1].into()),
+            ("sources_out", (&sources).into()),
+            ("few_sources", (&few_sources).into()),
+        ]
+    };
+    let swept = || -> Bindings { vec![("sources", (&sources).into()), ("few_sources", (&few_sources).into())] };
+    let outer = rec.specialize_with(&[("ALONE", f64::from(u8::from(few)))]);
+    let begin = [from, stepped(moments)].concat();
+    rec.dispatch(("light_field", "field_start"), bindings(&start, begin), [count, 1, 1]);
+    let steps = match task.moved {
+        Some((_, sweeps)) => vec![[1.0; 2]; sweeps as usize],
+        None => chebyshev(stage.sweeps),
+    };
+    if few {
+        let level = FieldLevel { relaxation: steps[0][0], sweeps: steps.len() as u32, ..level.clone() };
+        let all = [vec![("sources", (&unread).into())], stepped(moments)].concat();
+        rec.dispatch(("light_field", "field_sweep_few"), bindings(&level, all), [FEW_GROUP as u32, 1, 1]);
+    } else {
+        for [relaxation, weight] in steps {
+            let down = if stage.is_flat() { DIRECTIONS as u32 } else { STEEP };
+            rec.dispatch(("light_field", "field_sweep_down"), bindings(&level, swept()), [x, y, down]);
+            if !stage.is_flat() {
+                let size = [x.max(y), z, DIRECTIONS as u32 - STEEP];
+                rec.dispatch(("light_field", "field_sweep_along"), bindings(&level, swept()), size);
+            }
+            let step = FieldLevel { relaxation, weight, ..level.clone() };
+            rec.dispatch(("light_field", "field_gather"), bindings(&step, stepped(moments)), [count, 1, 1]);
+            moments.reverse();
+        }
+    }
+    rec.specialize(outer);
+    let keep = vec![
+        ("moments_now", moments[0].into()),
+        ("sun_out", (&solution.sun).into()),
+        ("sky_out", (&solution.sky).into()),
+    ];
+    rec.dispatch(("light_field", "field_keep"), bindings(&level, keep), stage.cells);
+    moments[0]
 }
 
-/// Uniform block of a stage.
-fn level_block(stage: &Stage, sun: &Sun, coarser: Option<&Stage>) -> FieldLevel {
+/// Uniform block of a stage. `coarser` is the stage around it, with the position of the middle relative to that of it.
+fn level_block(stage: &Stage, sun: &Sun, coarser: Option<(&Stage, DVec2)>) -> FieldLevel {
     let speed = (0..3).map(|axis| sun.toward[axis].abs() / stage.cell[axis]).fold(0.0, f32::max);
     let height = stage.cell[2] * stage.cells[2] as f32;
     // Until the ray leaves at the top, or at a side.
@@ -261,90 +379,191 @@ fn level_block(stage: &Stage, sun: &Sun, coarser: Option<&Stage>) -> FieldLevel 
         sunlit: sun.is_up.into(),
         bend: sun.bend,
         sun_steps,
-        tilt_crosses: (TILT * stage.cell[0].min(stage.cell[1]) > stage.cell[2]).into(),
+        tilt_crosses: stage.is_flat().into(),
         ..FieldLevel::default()
     };
-    if let Some(coarser) = coarser {
+    if let Some((coarser, offset)) = coarser {
         [level.coarser_across, level.coarser_along, level.coarser_rows] = coarser.cells;
         level.coarser_scale = std::array::from_fn(|axis| stage.cell[axis] / coarser.cell[axis]);
+        let [x, y, _] = coarser.cell;
+        level.coarser_offset = [offset.x as f32 / x, offset.y as f32 / y];
     }
     level
 }
 
 impl LightField {
-    pub fn update(&mut self, rec: &mut Recorder<'_>, inputs: &Inputs<'_>) -> Result<()> {
-        let Inputs { params, quality, frame, eye, time, .. } = *inputs;
-        if !field::is_read(params) {
-            return Ok(());
+    /// What a frame of an animation needs of the field. Sets the positions of its levels in the frame. `follows` says
+    /// whether the frame continues one before it.
+    pub fn follow(&self, frame: &mut Frame, follows: bool, now: &Now<'_>) -> Due {
+        let Some(shape) = frame.field else { return Due::Still };
+        let made = self.animated.as_ref().filter(|(solved, token)| token.is_submitted() && solved.shape == shape);
+        let Some((solved, _)) = made.filter(|_| follows) else { return Due::Whole };
+        let due = field::due(solved.levels.iter().map(|(anchor, _)| anchor), &shape, now);
+        if let Due::Levels(levels) = &due {
+            frame.set_field_levels(&shape, |level| levels[level].0.eye(now));
         }
+        due
+    }
+
+    /// Textures of optics, of the sun's field and of the sky's field: of the last still, or of the animation.
+    pub fn textures(&self, animated: bool) -> Option<&[wgpu::TextureView; 3]> {
+        let animation = self.animated.as_ref().map(|(solved, _)| &solved.textures);
+        let textures = if animated { animation } else { self.still.made() };
+        textures.map(|textures| &textures.levels)
+    }
+
+    pub fn update(&mut self, rec: &mut Recorder<'_>, inputs: &Inputs<'_>) -> Result<()> {
+        let Inputs { params, frame, eye, time, .. } = *inputs;
+        let Some(shape) = frame.field else { return Ok(()) };
         let forward = self.forward.update(rec, params.light.clone(), |rec| {
             let [columns, rows] = FORWARD_SIZE.map(|n| n as u32);
             let texture = rec.gpu.flat("forward_table", [columns, rows], wgpu::TextureFormat::R32Float);
             rec.gpu.write_texture(&texture, &forward_table(&params.light));
             Ok(view(&texture))
         })?;
-        let shape = FieldShape::new(params, quality, frame.view.altitude);
-        let lit = frame.sunlit(params);
-        let planet = (params.atmosphere.planet_radius, Grid(params.volume.clone()));
-        let key = (casters(params), params.light.clone(), planet, field::origin(eye, params, time).steps, shape, lit);
-        let (textures, ground) = self.lut.update(rec, key, |rec| bake(rec, inputs, &shape, lit))?;
+        let more_sweeps = self.more_sweeps;
+        let textures = match &inputs.field {
+            Due::Still => {
+                let planet = (params.atmosphere.planet_radius, Grid(params.volume.clone()));
+                let steps = field::origin(eye, params, time).steps;
+                let lit = frame.sunlit(params);
+                let key = (casters(params), params.light.clone(), planet, steps, shape, (lit, more_sweeps));
+                self.still.update(rec, key, |rec| Ok(bake(rec, inputs, more_sweeps)?.textures))?
+            }
+            Due::Whole => {
+                self.animated = None;
+                let solved = bake(rec, inputs, more_sweeps)?;
+                self.animated.insert((solved, rec.token())).0.textures.clone()
+            }
+            Due::Levels(anchors) => {
+                let (mut solved, _) = self.animated.take().expect("was found when the frame was planned");
+                // From the coarsest, whose light enters the others.
+                for number in (0..anchors.len()).rev().filter(|number| anchors[*number].1.sweeps > 0) {
+                    follow(rec, inputs, &mut solved, number, anchors)?;
+                }
+                self.animated.insert((solved, rec.token())).0.textures.clone()
+            }
+        };
         let names = ["field_optics", "field_sun", "field_sky"];
-        rec.bind(names.into_iter().zip(textures.iter().map(Binding::from)));
-        rec.bind([("forward_table", (&forward).into()), ("field_ground", (&ground).into())]);
+        rec.bind(names.into_iter().zip(textures.levels.iter().map(Binding::from)));
+        rec.bind([("forward_table", (&forward).into()), ("field_ground", (&textures.ground).into())]);
         Ok(())
     }
 }
 
-/// Solves all levels, and stores them in one stack of textures: optics, sun's field, sky's field.
-fn bake(rec: &mut Recorder<'_>, inputs: &Inputs<'_>, shape: &FieldShape, lit: bool) -> Result<Field> {
-    let Inputs { params, eye, time, frame, .. } = *inputs;
-    let origin = field::origin(eye, params, time);
-    let centre: DVec3 = origin.place.extend(0.0);
-    let mut there = Frame::new(&Camera::equirect(centre)?, params, origin.time, [1, 1]);
-    there.set_field(centre, params, origin.time, inputs.quality);
+/// Frame at the middle of a level, and the sun there.
+fn there(inputs: &Inputs<'_>, anchor: &Anchor) -> Result<(Frame, Sun)> {
+    let Inputs { params, frame, .. } = *inputs;
+    let centre = anchor.on_ground(params);
+    let mut there = Frame::new(&Camera::equirect(centre)?, params, anchor.time, [1, 1]);
+    let shape = frame.field.expect("the picture reads the field");
+    there.set_field(centre, params, anchor.time, shape);
+    there.dispatch = frame.dispatch.clone();
     let toward = there.in_field(glam::Vec3::from_array(there.sky.sun_direction)).to_array();
     let bend = if params.volume.is_some() { 0.0 } else { 0.5 / params.atmosphere.planet_radius };
-    let sun = Sun { toward, is_up: lit, bend };
-    there.dispatch = frame.dispatch.clone();
+    Ok((there, Sun { toward, is_up: frame.sunlit(params), bend }))
+}
+
+/// Solves all levels from nothing.
+fn bake(rec: &mut Recorder<'_>, inputs: &Inputs<'_>, more_sweeps: u32) -> Result<Solved> {
+    let Inputs { params, eye, time, .. } = *inputs;
+    let anchor = Anchor::still(eye, params, time);
+    let (there, sun) = there(inputs, &anchor)?;
+    let shape = there.field.expect("was set");
     let bindings = there.bindings(rec.gpu).to_vec();
     let whole = [shape.cells[0], shape.cells[1], shape.rows_before(shape.levels)];
-    let stacks = ["field_optics", "field_sun", "field_sky"].map(|label| view(&rec.gpu.texture_3d(label, whole)));
+    let levels = ["field_optics", "field_sun", "field_sky"].map(|label| view(&rec.gpu.texture_3d(label, whole)));
     let ground = view(&rec.gpu.texture("field_ground", [shape.cells[0], shape.cells[1] * shape.levels, 1], 1));
+    let textures = Textures { levels, ground };
     let sides = if params.volume.is_some() { SIDES_OPEN } else { SIDES_PERIODIC };
+    let low = sun.toward[2].abs() < LOW_SUN;
+    let mut stages = stages(&shape, sides, if low { LOW_SUN_SWEEPS } else { LEVEL_SWEEPS });
+    stages.iter_mut().for_each(|stage| stage.sweeps *= 1 + more_sweeps);
+    let scratch = Scratch::new(rec.gpu, &stages);
+    let mut levels: Vec<(Anchor, Solution)> = Vec::new();
     let mut coarser: Option<Solution> = None;
-    for stage in stages(shape, sides) {
-        let size = stage.cells;
-        let solved = solve(rec, stage, &sun, coarser.as_ref(), &bindings, Densities::Baked);
-        if let Some(number) = solved.stage.level {
-            let mut level = level_block(&solved.stage, &sun, coarser.as_ref().map(|coarser| &coarser.stage));
-            level.first_row = shape.rows_before(number);
-            let other = coarser.as_ref().unwrap_or(&solved);
-            let [optics_out, sun_out, sky_out] = &stacks;
-            let own: Bindings = vec![
-                ("level", uniform(&[&level])),
-                ("level_optics", (&solved.optics).into()),
-                ("moments_now", (&solved.moments).into()),
-                ("coarser_optics", (&other.optics).into()),
-                ("coarser_moments", (&other.moments).into()),
-                ("volume_out", optics_out.into()),
-                ("sun_out", sun_out.into()),
-                ("sky_out", sky_out.into()),
-            ];
-            if sides == SIDES_PERIODIC {
-                let rows = FieldLevel { first_row: number * shape.cells[1], ..level.clone() };
-                let more = vec![
-                    ("level", uniform(&[&rows])),
-                    ("radiances", (&solved.radiances).into()),
-                    ("map_out", (&ground).into()),
-                ];
-                let bindings = [more, own.clone(), bindings.clone()].concat();
-                rec.dispatch(("light_field", "field_ground_bake"), bindings, [size[0], size[1], 1]);
-            }
-            rec.dispatch(("light_field", "field_store"), [own, bindings.clone()].concat(), solved.stage.cells);
+    for stage in stages {
+        let solution = Solution::new(rec.gpu, stage);
+        let around = coarser.as_ref().map(|coarser| (coarser, DVec2::ZERO));
+        if let Some(around) = around.filter(|_| solution.stage.sides == SIDES_COARSER) {
+            enter(rec, &solution, around, &sun, &scratch, &bindings);
         }
-        coarser = Some(solved);
+        let task = Task { sun: &sun, coarser: around, moved: None, bakes: true, frame: &bindings, scratch: &scratch };
+        solve(rec, &solution, &task);
+        store(rec, &solution, &task, &shape, &textures);
+        if solution.stage.level.is_some() {
+            levels.insert(0, (anchor.clone(), solution.clone()));
+        }
+        coarser = Some(solution);
     }
-    Ok((stacks, ground))
+    Ok(Solved { shape, textures, levels, scratch })
+}
+
+/// Radiance of the level around that has just been solved, where it enters a level.
+fn enter(
+    rec: &mut Recorder<'_>,
+    solution: &Solution,
+    (coarser, offset): (&Solution, DVec2),
+    sun: &Sun,
+    scratch: &Scratch,
+    frame: &Bindings,
+) {
+    let level = level_block(&solution.stage, sun, Some((&coarser.stage, offset)));
+    let own = vec![("level", uniform(&[&level]))];
+    let bindings = [own, scratch.bindings(), solution.as_level(), frame.clone()].concat();
+    rec.dispatch(("light_field", "field_entering"), bindings, [solution.stage.rim() as u32, DIRECTIONS as u32, 1]);
+}
+
+/// Stores a level that has just been solved in the textures of all levels, and the light on the ground under it.
+fn store(rec: &mut Recorder<'_>, solution: &Solution, task: &Task<'_>, shape: &FieldShape, textures: &Textures) {
+    let Some(number) = solution.stage.level else { return };
+    let around = task.coarser.map(|(coarser, offset)| (&coarser.stage, offset));
+    let level = level_block(&solution.stage, task.sun, around);
+    let coarser = task.coarser.map_or_else(|| solution.as_coarser(), |(coarser, _)| coarser.as_coarser());
+    let size = solution.stage.cells;
+    let [optics_out, sun_out, sky_out] = &textures.levels;
+    let out: Bindings =
+        vec![("volume_out", optics_out.into()), ("sun_out", sun_out.into()), ("sky_out", sky_out.into())];
+    let bindings = |first_row: u32, out: Bindings| -> Bindings {
+        let own = vec![("level", uniform(&[&FieldLevel { first_row, ..level.clone() }]))];
+        [own, out, task.scratch.bindings(), solution.as_level(), coarser.clone(), task.frame.clone()].concat()
+    };
+    rec.dispatch(("light_field", "field_store"), bindings(shape.rows_before(number), out), size);
+    if solution.stage.sides != SIDES_OPEN {
+        let map = vec![("map_out", (&textures.ground).into())];
+        let extent = [size[0], size[1], 1];
+        rec.dispatch(("light_field", "field_ground_bake"), bindings(number * shape.cells[1], map), extent);
+    }
+}
+
+/// Solves a level of an animation anew, beginning with its own field.
+fn follow(
+    rec: &mut Recorder<'_>,
+    inputs: &Inputs<'_>,
+    solved: &mut Solved,
+    number: usize,
+    levels: &[(Anchor, Work)],
+) -> Result<()> {
+    let now = inputs.now();
+    let anchor = levels[number].0.clone();
+    let (there, sun) = there(inputs, &anchor)?;
+    let frame = there.bindings(rec.gpu).to_vec();
+    let eyes: Vec<_> = levels.iter().map(|(anchor, _)| anchor.eye(&now)).collect();
+    let before = solved.levels[number].0.eye(&now);
+    let (fine, coarse) = solved.levels.split_at(number + 1);
+    let solution = &fine[number].1;
+    let around = coarse.first().map(|(_, coarser)| (coarser, eyes[number + 1] - eyes[number]));
+    let Work { sweeps, clouds: bakes } = levels[number].1;
+    let moved = Some((before - eyes[number], sweeps));
+    let task = Task { sun: &sun, coarser: around, moved, bakes, frame: &frame, scratch: &solved.scratch };
+    solve(rec, solution, &task);
+    store(rec, solution, &task, &solved.shape, &solved.textures);
+    if let Some(finer) = number.checked_sub(1) {
+        let offset = eyes[number] - eyes[finer];
+        enter(rec, &fine[finer].1, (solution, offset), &sun, &solved.scratch, &frame);
+    }
+    solved.levels[number].0 = anchor;
+    Ok(())
 }
 
 /// Cells of given extinctions for [`crate::Renderer::solve_light`].
@@ -371,14 +590,17 @@ pub(crate) fn solve_cells(rec: &mut Recorder<'_>, cells: &Cells<'_>, params: &pa
     let bindings = frame.bindings(rec.gpu).to_vec();
     let sides = if cells.periodic { SIDES_PERIODIC } else { SIDES_OPEN };
     let stage = Stage { cells: cells.size, cell: cells.cell, sides, sweeps: cells.sweeps, level: None };
+    let scratch = Scratch::new(rec.gpu, std::slice::from_ref(&stage));
     let sun = Sun { toward: cells.sun, is_up: true, bend: 0.0 };
-    let densities = rec.gpu.texture_3d("densities", cells.size);
     let texel = |v: &f32| [half::f16::from_f32(*v), half::f16::ZERO, half::f16::ZERO, half::f16::ZERO];
-    rec.gpu.write_texture(&densities, &cells.extinction.iter().map(texel).collect::<Vec<_>>());
-    let solved = solve(rec, stage, &sun, None, &bindings, Densities::Given(view(&densities)));
-    rec.download(&solved.moments, 0, solved.moments.size());
-    rec.download(&solved.deposits, 0, solved.deposits.size());
-    rec.download(&solved.balance, 0, solved.balance.size());
+    let solution = Solution::new(rec.gpu, stage);
+    let densities = solution.densities.texture();
+    rec.gpu.write_texture(densities, &cells.extinction.iter().map(texel).collect::<Vec<_>>());
+    let (frame, scratch) = (&bindings, &scratch);
+    let moments = solve(rec, &solution, &Task { sun: &sun, coarser: None, moved: None, bakes: false, frame, scratch });
+    for buffer in [moments, &scratch.deposits, &scratch.balance] {
+        rec.download(buffer, 0, buffer.size());
+    }
     Ok(())
 }
 
@@ -390,7 +612,7 @@ mod tests {
     #[test]
     fn stages_go_from_the_coarsest_to_the_finest() {
         let shape = FieldShape { cells: [64, 64, 20], cell: [100.0, 100.0, 100.0], base: 0.0, levels: 5, halvings: 1 };
-        let stages = stages(&shape, SIDES_PERIODIC);
+        let stages = stages(&shape, SIDES_PERIODIC, LEVEL_SWEEPS);
         let levels: Vec<_> = stages.iter().map(|stage| stage.level).collect();
         assert_eq!(levels, [None, None, None, None, Some(4), Some(3), Some(2), Some(1), Some(0)]);
         for stage in &stages {

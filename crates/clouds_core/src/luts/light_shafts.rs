@@ -6,7 +6,6 @@ use super::lut::{Inputs, Lut, view};
 use super::shadow;
 use super::sky::snap_to_cell;
 use crate::error::Result;
-use crate::field;
 use crate::frame::Frame;
 use crate::gpu::Recorder;
 use crate::params;
@@ -21,12 +20,12 @@ const SLICES: u32 = 32;
 /// baked for the centre of such a cell, so that it depends on the picture alone, not on earlier ones.
 const STEP: f64 = 16.0;
 
-/// Key of the volume: size, camera axes, fields of view and sky scale; sun, atmosphere; shadows, light of the light field;
-/// snapped position of the eye, and its position in the shadow clipmap.
+/// Key of the volume: size, camera axes, fields of view and sky scale; sun, atmosphere; shadows, light of the light field
+/// and whether the field is that of an animation; snapped position of the eye, and its position in the shadow clipmap.
 type Key = (
     ([u32; 3], [[f32; 3]; 3], [f32; 3]),
     (params::Sun, params::Atmosphere),
-    (shadow::Key, Option<params::Light>),
+    (shadow::Key, Option<(params::Light, bool)>),
     ([f64; 3], [f64; 2]),
 );
 
@@ -57,7 +56,7 @@ impl LightShafts {
         let place = DVec2::from_array(frame.sky.shadow_eye.map(f64::from)) + from.truncate() - eye.truncate();
         let place = ((place / STEP).round() * STEP).to_array();
         let (sun, air, shadows) = (params.sun.clone(), params.atmosphere.clone(), shadow::key(inputs));
-        let light = field::is_read(params).then(|| params.light.clone());
+        let light = frame.field.map(|_| (params.light.clone(), inputs.field.is_animated()));
         let key = ((size, axes, scales), (sun, air), (shadows, light), (from.to_array(), place));
         let volume = self.lut.update(rec, key, |rec| {
             let volume = view(&rec.gpu.texture_3d("light_shafts", size));

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use crate::error::{Error, Result};
+use crate::field::{Due, Now};
 use crate::frame::Frame;
 use crate::gpu::{
     Binding, Linked, Name, Recorder, Specialization, Token, disk_cache as cache, texture_bytes, texture_rows,
@@ -22,6 +23,15 @@ pub(crate) struct Inputs<'a> {
     pub time: f64,
     /// Specialization table of the kernels of the picture.
     pub specialization: Arc<Specialization>,
+    /// Levels of the light field that are solved.
+    pub field: Due,
+}
+
+impl Inputs<'_> {
+    /// Sky that the light field follows.
+    pub fn now(&self) -> Now<'_> {
+        Now { params: self.params, eye: self.eye, time: self.time }
+    }
 }
 
 /// Names of the maps that a mixing kernel adds up.
@@ -39,6 +49,11 @@ impl<K, T> Default for Lut<K, T> {
 }
 
 impl<K: PartialEq, T: Clone> Lut<K, T> {
+    /// The LUT that was used last.
+    pub fn made(&self) -> Option<&T> {
+        self.made.as_ref().map(|(_, made, _)| made)
+    }
+
     /// The LUT for a key, rebaked if the key has changed or the recording was never submitted.
     pub fn update<'a>(
         &mut self,

@@ -19,6 +19,7 @@ pub mod weather;
 
 use crate::blue_noise;
 use crate::error::Result;
+use crate::field::{Due, Now};
 use crate::frame::Frame;
 use crate::gpu::{Gpu, Recorder};
 use crate::params::{Params, Quality};
@@ -42,7 +43,7 @@ pub(crate) struct Luts {
     volume: volume::Volume,
     majorants: majorant::Majorants,
     ground_shadow: shadow::GroundShadow,
-    light_field: light_field::LightField,
+    pub light_field: light_field::LightField,
     light_shafts: light_shafts::LightShafts,
 }
 
@@ -91,6 +92,11 @@ impl Luts {
         self.light_field.update(rec, inputs)?; // on a step of clouds or eye, if the light model reads it
         self.ground_shadow.update(rec, inputs)?; // on a step of clouds or eye, if the shadows are visible
         self.light_shafts.update(rec, inputs) // on a step of clouds or eye or a new view, if clouds shade visible air
+    }
+
+    /// What a frame of an animation needs of the light field. `follows`: it continues the frame before.
+    pub fn follow(&self, frame: &mut Frame, follows: bool, now: &Now<'_>) -> Due {
+        self.light_field.follow(frame, follows, now)
     }
 
     /// Weather map without the other LUTs.

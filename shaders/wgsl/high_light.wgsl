@@ -22,9 +22,6 @@ const HIGH_FADE = 100.0;
 // Smallest cosine for the path of sunlight through the high clouds. They are 300 m thick (thesis2018: 200 to 400 m) and
 // about 1500 m wide, so that light which enters through their sides crosses at most five times their thickness.
 const HIGH_GRAZING = 0.2;
-// Half width, as a sine of the sun's elevation, of the range around their plane in which sunlight enters through their
-// sides: 3 degrees.
-const HIGH_SIDE = 0.05;
 // Two-stream reflectance per unit of optical depth: 3/4 (1 - g) with g = 0.85 of droplets (Hansen 1971).
 const HIGH_ALBEDO = 0.11;
 // Largest relative change of brightness by the emboss, and the relief at which half of it is reached.
@@ -40,16 +37,12 @@ fn high_layer(direction: vec3f, distance: f32, visible: bool, turned: Turn) -> L
     let fade = saturate(abs(frame.view.altitude - params.high_clouds.altitude) / HIGH_FADE);
     let high = high_cloud_at(p, HIGH_EMBOSS);
     let optical_depth = select(0.0, fade * high.optical_depth, visible);
-    let along = optical_depth / max(abs(cosine), 0.02);
-    let transmittance = transmittance_of(along);
+    let steep = max(abs(cosine), 0.02);
+    let transmittance = transmittance_of(optical_depth / steep);
 
     let mu_sun = cos_zenith_at(p, frame.sky.sun_direction);
-    let depth = depth_to_sun(
-        along,
-        optical_depth / max(abs(mu_sun), HIGH_GRAZING),
-        select(-mu_sun, mu_sun, cosine > 0.0),
-    );
-    var sun = seen_scattering(depth, 0.0, turned) * high_sun(mu_sun);
+    let behind = select(-mu_sun, mu_sun, cosine > 0.0);
+    var sun = layer_light(optical_depth, max(abs(mu_sun), HIGH_GRAZING), steep, behind, turned) * high_sun(mu_sun);
     if HIGH_EMBOSS {
         sun *= 1.0 + params.high_clouds.emboss * EMBOSS_GAIN * high.relief / (abs(high.relief) + EMBOSS_HALF);
     }
@@ -60,28 +53,13 @@ fn high_layer(direction: vec3f, distance: f32, visible: bool, turned: Turn) -> L
         // The ground below receives the light that high clouds and lower clouds transmit.
         let under = mix(1.0, 1.0 / (1.0 + HIGH_ALBEDO * optical_depth), params.high_clouds.coverage);
         let ground = under * ground_factor(p, mu_sun);
-        radiance += mix(
+        radiance += (1.0 - transmittance) * mix(
             ambient_below(ground * sky_light_uniform[1].rgb),
             ambient_above(sky_light_uniform[0].rgb),
             through,
         );
     }
-    return Layer((1.0 - transmittance) * radiance, transmittance, distance);
-}
-
-// Effective optical depth toward the sun of a uniform layer of optical depth `view` along the view ray and `light`
-// along the sun's ray. Its transmittance is the mean over the single scattering that reaches the eye. `behind` is the
-// sine of the sun's elevation beyond the layer as seen from the eye, negative on the eye's side.
-fn depth_to_sun(view: f32, light: f32, behind: f32) -> f32 {
-    let seen = log_mean_transmittance(view);
-    let front = seen - log_mean_transmittance(view + light);
-    let back = light + seen - log_mean_transmittance(view - light);
-    return mix(front, back, smoothstep(-HIGH_SIDE, HIGH_SIDE, behind));
-}
-
-// Logarithm of (1 - exp(-x)) / x, also for negative x.
-fn log_mean_transmittance(x: f32) -> f32 {
-    return max(-x, 0.0) + log(one_minus_exp_over(abs(x)));
+    return Layer(radiance, transmittance, distance);
 }
 
 // Irradiance of the sun at the high clouds, where its zenith cosine is `mu_sun`.

@@ -281,3 +281,22 @@ fn radiance_through_air(sum: Gathered, nodes: AerialPoints, direction: vec3f) ->
     }
     return radiance;
 }
+
+// Half width, as a sine of the sun's elevation, of the range around the plane of a layer of clouds in which
+// sunlight enters through their sides: 3 degrees.
+const LAYER_SIDE = 0.05;
+
+// Effective optical depth toward the sun of a uniform layer of optical depth `view` along the view ray and `light`
+// along the sun's ray. Its transmittance is the mean over the single scattering that reaches the eye. `behind` is the
+// sine of the sun's elevation beyond the layer as seen from the eye, negative on the eye's side.
+fn depth_to_sun(view: f32, light: f32, behind: f32) -> f32 {
+    let seen = log_mean_transmittance(view);
+    let front = seen - log_mean_transmittance(view + light);
+    let back = light + seen - log_mean_transmittance(view - light);
+    return mix(front, back, smoothstep(-LAYER_SIDE, LAYER_SIDE, behind));
+}
+
+// Logarithm of (1 - exp(-x)) / x, also for negative x.
+fn log_mean_transmittance(x: f32) -> f32 {
+    return max(-x, 0.0) + log(one_minus_exp_over(abs(x)));
+}

@@ -69,24 +69,20 @@ fn depth_toward_sun(p: vec3f, opacity: f32, width: f32) -> f32 {
 }
 
 fn lit_span(span: Span, p: vec3f, direction: vec3f, turned: Turn) -> Lit {
-    let forward = frame.sky.split.x;
     let scale = frame.sky.split.z;
     let source = frame.sky.split.w; // scaled albedo / 4 pi
-    let albedo = params.light.albedo;
     let end = span.start + span.thick;
     let weight = exp(-scale * span.start) * select(1.0 - exp(-scale * span.thick), 1.0, span.is_last);
     let seen = exp(-span.start) * select(1.0 - exp(-span.thick), 1.0, span.is_last);
     // Light that keeps going, and light that turns once.
-    let cosine = 1.0 - turned.one_minus_mu;
     let to_sun = span.depth_to_sun;
     let beam = exp(-to_sun) * seen;
     let scaled_beam = exp(-scale * to_sun) * weight / scale;
-    let turn = (1.0 - forward + 3.0 * (frame.sky.split.y - forward) * cosine) / (4.0 * PI);
     var chains = forward_chains(to_sun + span.start + 0.5 * span.thick, turned.one_minus_mu) * span.thick;
     if span.is_last {
         chains += forward_chains(to_sun + end, turned.one_minus_mu) / scale;
     }
-    var sun = albedo * (turned.phase * beam + chains + turn * (scaled_beam - beam));
+    var sun = once_turned(turned, beam, scaled_beam, chains);
     // Light that has turned before.
     let altitude = altitude_at(p);
     let q = field_place(p, altitude);
@@ -103,13 +99,8 @@ fn lit_span(span: Span, p: vec3f, direction: vec3f, turned: Turn) -> Lit {
 
 // Radiance per unit of irradiance and of optical depth of a thin layer.
 fn seen_scattering(depth: f32, precipitation: f32, turned: Turn) -> f32 {
-    let forward = frame.sky.split.x;
-    let scale = frame.sky.split.z;
-    let cosine = 1.0 - turned.one_minus_mu;
-    let turn = (1.0 - forward + 3.0 * (frame.sky.split.y - forward) * cosine) / (4.0 * PI);
-    let sum = turned.phase * exp(-depth) + forward_chains(depth, turned.one_minus_mu)
-        + turn * (exp(-scale * depth) - exp(-depth));
-    return params.light.albedo * max(sum, 0.0);
+    let chains = forward_chains(depth, turned.one_minus_mu);
+    return max(once_turned(turned, exp(-depth), exp(-frame.sky.split.z * depth), chains), 0.0);
 }
 
 fn slowest_extinction() -> f32 {
@@ -158,6 +149,57 @@ fn cloud_light(p: vec3f, altitude: f32, mu: f32, shade: f32) -> f32 {
     let q = field_place(p, altitude);
     let uvw = field_texel(q, field_level(q));
     return textureSampleLevel(field_sun, clamp_sampler, uvw, 0.0).r / (4.0 * PI);
+}
+
+// Radiance per unit of irradiance that a layer sends to the eye (marched_light.wgsl). Light that keeps going or turns
+// once has closed forms. Light that has turned before is the two-stream solution of the scaled layer without absorption:
+// a net flux through it that is constant with depth, a fluence whose slope follows from it, and no diffuse light that
+// enters at its faces (Marshak).
+fn layer_light(optical_depth: f32, mu_sun: f32, mu: f32, behind: f32, turned: Turn) -> f32 {
+    let through = smoothstep(-LAYER_SIDE, LAYER_SIDE, behind);
+    let scale = frame.sky.split.z;
+    let t = scale * optical_depth;
+    let scaled_beam = layer_beam(t, mu_sun, mu, through);
+    // Gauss-Legendre quadrature of two points.
+    var chains = 0.0;
+    for (var z = 0.2113; z < 1.0; z += 0.5774) {
+        let before = z / mu_sun + mix(z, 1.0 - z, through) / mu;
+        chains += 0.5 * forward_chains(optical_depth * before, turned.one_minus_mu) * optical_depth / mu;
+    }
+    let once = once_turned(
+        turned,
+        layer_beam(optical_depth, mu_sun, mu, through),
+        scaled_beam / scale,
+        chains,
+    );
+    // Net flux, of sunlight and turned light together: turned light has net - mu_sun exp(-z / mu_sun).
+    let cosine = frame.sky.turned_cosine;
+    let sun = exp(-t / mu_sun);
+    let net = mu_sun * (3.0 * mu_sun * (1.0 - sun) + 2.0 * (1.0 + sun)) / (4.0 + 3.0 * (1.0 - cosine) * t);
+    // Fluence: even - slope z - 3 mu_sun^2 exp(-z / mu_sun).
+    let even = mu_sun * (3.0 * mu_sun + 2.0) - 2.0 * net;
+    let slope = 3.0 * (1.0 - cosine) * net;
+    // Integrals of 1 and z over what the eye sees.
+    let whole = 1.0 - exp(-t / mu);
+    let depth = mix(mu * whole - t * (1.0 - whole), t - mu * whole, through);
+    let fluence = even * whole - slope * depth - 3.0 * mu_sun * mu_sun * scaled_beam;
+    let flux = mix(-mu, mu, through) * (net * whole - mu_sun * scaled_beam);
+    return max(once + frame.sky.split.w * (fluence + 3.0 * cosine * flux), 0.0);
+}
+
+// Optical depth of a layer along the view ray, weighted by the transmittance from the sun to the eye.
+fn layer_beam(t: f32, mu_sun: f32, mu: f32, through: f32) -> f32 {
+    let front = one_minus_exp_over(t * (1.0 / mu + 1.0 / mu_sun));
+    let back = exp(-t / max(mu, mu_sun)) * one_minus_exp_over(t * abs(1.0 / mu - 1.0 / mu_sun));
+    return t / mu * mix(front, back, through);
+}
+
+// Light that has turned at most once: `beam` and `scaled_beam` are the optical depth that the eye sees, weighted by the
+// transmittance of the way, and the same with scaled extinctions.
+fn once_turned(turned: Turn, beam: f32, scaled_beam: f32, chains: f32) -> f32 {
+    let forward = frame.sky.split.x;
+    let turn = (1.0 - forward + 3.0 * (frame.sky.split.y - forward) * (1.0 - turned.one_minus_mu)) / (4.0 * PI);
+    return params.light.albedo * (turned.phase * beam + chains + turn * (scaled_beam - beam));
 }
 
 fn forward_background(direction: vec3f, transmittance: f32, depth: f32) -> vec3f {

@@ -479,6 +479,8 @@ def test_order(renderer, altitude, height, pitch):
     # The clouds shade the ground, which lights the layer.
     dark = {"atmosphere.ground_albedo": (0.0, 0.0, 0.0)}
     params = high_params(values, **{"clouds.coverage": 0.6, "sun.elevation": 50.0} | dark)
+    # By `multiple` the clouds shade the layer below them.
+    params = params.with_(**{"light.model": "octaves"})
     eye = np.array([0, 0, height])
     # From between the two rays meet both where they pass just over the ground.
     pitch, fov = (-1.9, 1.0) if 3200 < height < altitude else (pitch, 30.0)

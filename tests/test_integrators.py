@@ -10,6 +10,7 @@ from nubis import ParameterError
 
 SIZE = 16, 9
 CAMERA, SKY = nubis.scenes["fair_weather"]
+SKY = SKY.with_(**{"light.model": "octaves"})
 PATH = nubis.quality("draft").replace(integrator="path", path_samples=16, path_scatterings=64)
 
 

@@ -12,11 +12,12 @@ SIZE = 160, 90
 SOME = slice(4, None, 9), slice(4, None, 9)
 OFF = {"atmosphere.light_shafts": False}
 CHEAP = nubis.quality("draft").replace(steps_zenith=8, steps_horizon=8, light_steps=1)
-#: As clouds pass it on (Haurwitz 1948, stratus).
+#: As clouds pass it on (Haurwitz 1948, stratus) with the light model `octaves`.
 PASSED_ON = 0.25
 
 
 def sky(camera, params, size=SIZE, **given):
+    params = params.with_(**{"light.model": "octaves"})
     layers = nubis.Renderer(*size, quality=CHEAP).render_layers(camera, params, **given)
     return layers["sky"].astype(np.float64)
 

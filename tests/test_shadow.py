@@ -146,10 +146,12 @@ def ground_points(camera, params):
 
 
 def seen_ground(camera, params, time=0.0, **changes):
-    """The radiance behind the clouds, and behind air that is not shaded."""
+    """The radiance behind the clouds and behind air without shadows: by the model `octaves`, with
+    which clouds pass on a quarter of the sunlight.
+    """
     quality = nubis.quality("draft").replace(steps_zenith=8, steps_horizon=8, light_steps=1)
     ours = nubis.Renderer(*SIZE, quality=quality)
-    params = params.with_(**{"atmosphere.light_shafts": False}, **changes)
+    params = params.with_(**{"light.model": "octaves", "atmosphere.light_shafts": False}, **changes)
     sky = ours.render_layers(camera, params, time=time)["sky"]
     return sky.reshape(-1, 3).astype(np.float64)
 

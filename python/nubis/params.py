@@ -486,7 +486,8 @@ class Light(Block):
         Diameter of the droplets for `droplet` and `mie`: fog 5 to 20, cumulus 10 to 30, drizzle 50.
         Allowed: a number from 5 to 50 µm.
     g : float
-        Asymmetry parameter (mean cosine) of the forward lobe of the phase function. Allowed: a
+        Asymmetry parameter (mean cosine) of the forward lobe of the phase function: 0.85 for
+        droplets. `octaves` is fitted for 0.6, which suits the published models, too. Allowed: a
         number from -0.9999 to 0.9999.
     g_back : float
         Asymmetry parameter (mean cosine) of the backward lobe (thesis2018, vsu2022). Allowed: a
@@ -494,7 +495,8 @@ class Light(Block):
     lobe_mix : float
         Weight of the forward lobe (vsu2022). Allowed: a number from 0 to 1.
     albedo : float
-        Single-scattering albedo (`single`, `octaves`, `path`). Allowed: a number from 0 to 1.
+        Single-scattering albedo (`single`, `octaves`, `multiple`, `path`). Allowed: a number from 0
+        to 1.
     octaves : int
         Number of orders of scattering in the sum of the `octaves` model. Allowed: a whole number
         from 1 to 16.
@@ -527,9 +529,10 @@ class Light(Block):
         Tint of the ambient light at the cloud base. Its brightness follows from sky and ground.
         Allowed: 3 numbers from 0 to 1000.
     ambient_occlusion : float
-        Occlusion of the ambient light within clouds: 1 weights light from above and below by the
-        optical depths above and below the point (two streams, Bohren 1987), 0 by height alone, as
-        in the published models. Allowed: a number from 0 to 1.
+        Occlusion of the ambient light within clouds (all models but `single` and `multiple`): 1
+        weights light from above and below by the optical depths above and below the point (two
+        streams, Bohren 1987), 0 by height alone, as in the published models. Allowed: a number from
+        0 to 1.
     powder : float
         Strength of the darkening of thin edges in the published models ("powdered sugar",
         nubis2015); 0 is none. Allowed: a number from 0 to 1.

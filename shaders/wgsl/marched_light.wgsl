@@ -66,9 +66,9 @@ fn cloud_light(p: vec3f, altitude: f32, mu: f32, shade: f32) -> f32 {
     return PASSED_ON * max(mu, 0.0) / (2.0 * PI) * shade;
 }
 
-// Radiance per unit of irradiance that a uniform layer of an optical depth across it sends to the eye. `mu_sun` and `mu`
-// are the cosines of the sun's ray and of the view ray to its normal; `behind` is the sine of the sun's elevation beyond
-// the layer as seen from the eye, negative on the eye's side.
+// Radiance per unit of irradiance that a uniform layer of an optical depth across it sends to the eye. `mu_sun` and
+// `mu` are the cosines of the sun's ray and of the view ray to its normal; `behind` is the sine of the sun's elevation
+// beyond the layer as seen from the eye, negative on the eye's side.
 fn layer_light(optical_depth: f32, mu_sun: f32, mu: f32, behind: f32, turned: Turn) -> f32 {
     let along = optical_depth / mu;
     let depth = depth_to_sun(along, optical_depth / mu_sun, behind);

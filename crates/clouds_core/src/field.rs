@@ -38,8 +38,8 @@ const REACH: f32 = 50_000.0;
 /// Displacement of the clouds in m up to which the field is reused. A power of two (clipmap.rs).
 const CLOUD_STEP: f64 = 64.0;
 
-/// Number of pixels below which a picture has half as many cells across, twice as wide, if it has at most `SMALL_CELLS`:
-/// its field takes a third of the time (docs/speed.md). From 320 x 180 on the whole field is solved.
+/// Number of pixels below which a picture of procedural clouds has half as many cells across, twice as wide, if it has
+/// at most `SMALL_CELLS`: its field takes a third of the time (docs/speed.md). From 320 x 180 on the whole field is solved.
 const SMALL_PICTURE: u64 = 57_600;
 const SMALL_CELLS: u32 = 64;
 /// Smallest number of cells across.
@@ -368,7 +368,7 @@ mod tests {
         assert!(anchor.eye(&now).abs().max_element() <= 50.0 + 1e-6);
     }
 
-    /// Small pictures have half as many cells, twice as wide; grids and finer qualities have all.
+    /// Small pictures have half as many cells, twice as wide, but in `high` and `reference`.
     #[test]
     fn small_pictures_have_a_coarser_field() {
         let cells = |params: &Params, quality: &Quality, pixels| {

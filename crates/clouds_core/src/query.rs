@@ -118,7 +118,7 @@ impl Renderer {
         }
         let camera = Camera::equirect(DVec3::from_array(center))?;
         let map_buffer = self.gpu.buffer("shadow_out", 4 * u64::from(size) * u64::from(size));
-        let (mut rec, mut frame) = self.record(&Shot::new(&camera, params, time), interrupt)?;
+        let (mut rec, mut frame) = self.record(&Shot::new(&camera, params, time), false, interrupt)?;
         [frame.view.width, frame.view.height] = [size; 2];
         [frame.dispatch.march_width, frame.dispatch.strip_rows] = [size; 2];
         frame.sky.shadow_texel = (extent / f64::from(size)) as f32;
@@ -211,7 +211,7 @@ impl Renderer {
         check_fork()?;
         if !animated {
             self.luts.light_field.more_sweeps = times - 1;
-            let recorded = self.record(shot, interrupt).and_then(|(rec, _)| rec.submit());
+            let recorded = self.record(shot, true, interrupt).and_then(|(rec, _)| rec.submit());
             self.luts.light_field.more_sweeps = 0;
             recorded?;
         }
@@ -265,17 +265,27 @@ impl Renderer {
         most: usize,
         interrupt: Interrupt<'_>,
     ) -> Result<Vec<[f32; 4]>> {
-        let (mut rec, frame) = self.record(shot, interrupt)?;
+        let read = match kernel {
+            Which::Named(name, specialization) => self.gpu.kernel(*name, specialization)?,
+            Which::Made(kernel) => kernel.clone(),
+        };
+        let (mut rec, frame) = self.record(shot, read.reads("field_"), interrupt)?;
         points::run(&mut rec, &frame, kernel, points, most)
     }
 
-    /// Recording with the LUTs of a sky bound, and its frame.
-    fn record<'a>(&'a mut self, shot: &Shot<'_>, interrupt: Interrupt<'a>) -> Result<(Recorder<'a>, Frame)> {
+    /// Recording with the LUTs of a sky bound, the light field among them if it is read, and its frame.
+    fn record<'a>(
+        &'a mut self,
+        shot: &Shot<'_>,
+        reads_field: bool,
+        interrupt: Interrupt<'a>,
+    ) -> Result<(Recorder<'a>, Frame)> {
         let (mut frame, params) = shot.checked(self.size, &self.quality)?;
         frame.light_shafts = false;
         // Answers do not depend on the size of pictures.
-        if let Some(shape) = FieldShape::new(&params, &self.quality, frame.view.altitude, u64::MAX) {
-            frame.set_field(shot.camera.eye, &params, shot.time, shape);
+        match FieldShape::new(&params, &self.quality, frame.view.altitude, u64::MAX).filter(|_| reads_field) {
+            Some(shape) => frame.set_field(shot.camera.eye, &params, shot.time, shape),
+            None => frame.field = None,
         }
         self.timings = Timings::default();
         let mut rec = Recorder::new(&self.gpu, &mut self.timings, interrupt);

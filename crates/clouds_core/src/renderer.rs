@@ -86,12 +86,14 @@ impl Renderer {
     ///
     /// The owner `scene` has LUTs, whose sizes do not depend on the picture's. Exceptions are `light_shafts`, which is
     /// smaller for small pictures, and the textures of the user's scene. Noise textures are shared by the renderers of
-    /// a device. The owners `still` and `animation` have buffers in proportion to the number of pixels.
+    /// a device. The owners `still` and `animation` have buffers in proportion to the number of pixels. The owner
+    /// `light_field` has what an animation keeps to follow the sky.
     pub fn memory(&self) -> Vec<(&'static str, &'static str, u64)> {
         let mut held: Vec<_> = self.lut_memory.iter().map(|&(name, bytes)| ("scene", name, bytes)).collect();
         let still = self.still.iter().flat_map(|targets| targets.bindings()).map(|held| ("still", held));
         let temporal = self.animation.iter().flat_map(|targets| targets.bindings()).map(|held| ("animation", held));
         held.extend(still.chain(temporal).map(|(owner, (name, binding))| (owner, name, binding.bytes())));
+        held.extend(self.luts.light_field.kept().into_iter().map(|(name, bytes)| ("light_field", name, bytes)));
         held.extend(self.moonlit.iter().flat_map(|lit| lit.memory()));
         held
     }

@@ -152,9 +152,10 @@ fn cloud_light(p: vec3f, altitude: f32, mu: f32, shade: f32) -> f32 {
 }
 
 // Radiance per unit of irradiance that a layer sends to the eye (marched_light.wgsl). Light that keeps going or turns
-// once has closed forms. Light that has turned before is the two-stream solution of the scaled layer without absorption:
-// a net flux through it that is constant with depth, a fluence whose slope follows from it, and no diffuse light that
-// enters at its faces (Marshak).
+// once has closed forms. Light that has turned before is the two-stream solution of the scaled layer without
+// absorption: a net flux through it that is constant with depth, a fluence whose slope follows from it, and no diffuse
+// light that enters at its faces (Marshak). Beside path-traced layers of an optical depth up to 6: from below within
+// 15 %, from above up to 36 % too dark at a grazing view.
 fn layer_light(optical_depth: f32, mu_sun: f32, mu: f32, behind: f32, turned: Turn) -> f32 {
     let through = smoothstep(-LAYER_SIDE, LAYER_SIDE, behind);
     let scale = frame.sky.split.z;

@@ -293,6 +293,13 @@ pub struct Kernel {
     variables: Vec<Variable>,
 }
 
+impl Kernel {
+    /// Whether it binds a resource whose name has a prefix.
+    pub(crate) fn reads(&self, prefix: &str) -> bool {
+        self.variables.iter().any(|variable| variable.name.starts_with(prefix))
+    }
+}
+
 /// Buffers of the uniform blocks and of the dispatch arguments of a recording.
 pub(crate) struct Resources<'a> {
     pub blocks: &'a wgpu::Buffer,

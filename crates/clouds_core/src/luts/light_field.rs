@@ -405,6 +405,20 @@ impl LightField {
         due
     }
 
+    /// What an animation keeps besides the textures that are bound, by name, in bytes: its levels, and the buffers that
+    /// they share.
+    pub fn kept(&self) -> Vec<(&'static str, u64)> {
+        let Some((Solved { levels, scratch, .. }, _)) = &self.animated else { return Vec::new() };
+        let level = |(_, level): &(Anchor, Solution)| -> u64 {
+            let Solution { densities, optics, sun, sky, entering, .. } = level;
+            let textures = [densities, optics, sun, sky].map(|texture| Binding::from(texture).bytes());
+            textures.iter().sum::<u64>() + entering.size()
+        };
+        let shared = scratch.bindings().into_iter().filter(|(name, _)| *name != "few_radiances");
+        let shared = shared.map(|(_, binding)| binding.bytes()).sum();
+        vec![("levels", levels.iter().map(level).sum()), ("scratch", shared)]
+    }
+
     /// Textures of optics, of the sun's field and of the sky's field: of the last still, or of the animation.
     pub fn textures(&self, animated: bool) -> Option<&[wgpu::TextureView; 3]> {
         let animation = self.animated.as_ref().map(|(solved, _)| &solved.textures);
@@ -414,13 +428,18 @@ impl LightField {
 
     pub fn update(&mut self, rec: &mut Recorder<'_>, inputs: &Inputs<'_>) -> Result<()> {
         let Inputs { params, frame, eye, time, .. } = *inputs;
-        let Some(shape) = frame.field else { return Ok(()) };
+        if params.light.model != params::Model::Multiple {
+            return Ok(());
+        }
         let forward = self.forward.update(rec, params.light.clone(), |rec| {
             let [columns, rows] = FORWARD_SIZE.map(|n| n as u32);
             let texture = rec.gpu.flat("forward_table", [columns, rows], wgpu::TextureFormat::R32Float);
             rec.gpu.write_texture(&texture, &forward_table(&params.light));
             Ok(view(&texture))
         })?;
+        // High clouds need no field.
+        rec.bind([("forward_table", (&forward).into())]);
+        let Some(shape) = frame.field else { return Ok(()) };
         let more_sweeps = self.more_sweeps;
         let textures = match &inputs.field {
             Due::Still => {
@@ -446,7 +465,7 @@ impl LightField {
         };
         let names = ["field_optics", "field_sun", "field_sky"];
         rec.bind(names.into_iter().zip(textures.levels.iter().map(Binding::from)));
-        rec.bind([("forward_table", (&forward).into()), ("field_ground", (&textures.ground).into())]);
+        rec.bind([("field_ground", (&textures.ground).into())]);
         Ok(())
     }
 }
@@ -476,7 +495,7 @@ fn bake(rec: &mut Recorder<'_>, inputs: &Inputs<'_>, more_sweeps: u32) -> Result
     let ground = view(&rec.gpu.texture("field_ground", [shape.cells[0], shape.cells[1] * shape.levels, 1], 1));
     let textures = Textures { levels, ground };
     let sides = if params.volume.is_some() { SIDES_OPEN } else { SIDES_PERIODIC };
-    let low = sun.toward[2].abs() < LOW_SUN;
+    let low = sun.is_up && sun.toward[2].abs() < LOW_SUN;
     let mut stages = stages(&shape, sides, if low { LOW_SUN_SWEEPS } else { LEVEL_SWEEPS });
     stages.iter_mut().for_each(|stage| stage.sweeps *= 1 + more_sweeps);
     let scratch = Scratch::new(rec.gpu, &stages);

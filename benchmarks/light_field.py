@@ -2,6 +2,7 @@
 
     python -m benchmarks.light_field                     # errors of the light models
     python -m benchmarks.light_field --truth --paths 256 # path-traces the skies, an hour
+    python -m benchmarks.light_field --speed             # times of the field, and of animations
 
 The path tracer of this project traces every order of scattering in the same clouds. The sun is the
 only light; ground and sky are black. Compared are means of 8 x 8 pixels that show clouds.
@@ -10,7 +11,9 @@ only light; ground and sky are black. Compared are means of 8 x 8 pixels that sh
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -112,8 +115,69 @@ def errors(model: str, g: float, scene: str, sun: tuple[float, float], quality: 
     )
 
 
+def solved_in(scene: str, quality: str, size: tuple[int, int]) -> float:
+    """Seconds that a new sun adds to a picture: the least of four."""
+    camera, params = nubis.scenes[scene]
+    params = params.with_(**{"light.model": "multiple", "light.g": G})
+    renderer = nubis.Renderer(*size, quality=quality)
+    new, same = [], []
+    for i in range(4):
+        turned = params.with_(**{"sun.azimuth": 10.0 + i})
+        for times in (new, same):
+            started = perf_counter()
+            renderer.render(camera, turned)
+            times.append(perf_counter() - started)
+    return min(new) - min(same)
+
+
+def frames_in(scene: str, quality: str, what: str, model: str) -> float:
+    """Mean seconds of ten frames of 640 x 360: a sun that rises by 0.05 degrees a frame, a lapse of
+    10 s a frame, or a flight of 5 m a frame.
+    """
+    camera, params = nubis.scenes[scene]
+    params = params.with_(**{"light.model": model, "light.g": G if model == "multiple" else 0.6})
+
+    def shots() -> Iterator[tuple[nubis.Camera, nubis.Params, float]]:
+        for i in range(14):
+            flown = 5.0 * i if what == "flight" else 0.0
+            eye = np.add(camera.eye, [flown, 0.0, 0.0])
+            sun = params.sun.elevation + (0.05 * i if what == "sun" else 0.0)
+            yield (
+                nubis.Camera.look_at(eye, eye + camera.forward),
+                params.with_(**{"sun.elevation": sun}),
+                10.0 * i if what == "lapse" else i / 30,
+            )
+
+    times = [perf_counter()]
+    for _ in nubis.Renderer(640, 360, quality=quality).animate(shots()):
+        times.append(perf_counter())
+    return float(np.mean(np.diff(times)[4:]))
+
+
+def speed() -> None:
+    """Prints the times of the field and of animations."""
+    kinds = "sun", "lapse", "flight"
+    print("| sky, quality | field, s | " + " | ".join(f"{kind}, ms" for kind in kinds) + " |")
+    print("| --- | ---: |" + " ---: |" * len(kinds))
+    for scene in ("fair_weather", "storm"):
+        for quality in ("draft", "balanced", "high"):
+            cells = []
+            for kind in kinds:
+                octaves, field = (
+                    frames_in(scene, quality, kind, model) for model in ("octaves", "multiple")
+                )
+                cells.append(f"{1000 * field:.0f}, {field / octaves:.2f}")
+            solved = solved_in(scene, quality, (640, 360))
+            print(
+                f"| {scene}, `{quality}` | {solved:.2f} | " + " | ".join(cells) + " |", flush=True
+            )
+    small = solved_in("fair_weather", "balanced", (64, 36))
+    print(f"| fair_weather, `balanced`, 64×36 | {small:.2f} | | | |")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--speed", action="store_true", help="print times instead of errors")
     parser.add_argument("--truth", action="store_true", help="trace the skies that are missing")
     parser.add_argument("--paths", type=int, default=256)
     parser.add_argument("--quality", default="high")
@@ -125,6 +189,9 @@ def main() -> None:
     adapter = made["adapter"]
     machine = f"{made['cpu']}, {made['cores']} cores"
     print(f"{made['date']}, {adapter['name']} ({adapter['driver']}), {machine}")
+    if arguments.speed:
+        speed()
+        return
     truth = np.load(STORE)
     models = ("single", G), ("octaves", 0.6), ("octaves", G), ("multiple", G)
     print("| sky, sun | noise | " + " | ".join(f"{m}, g {g}" for m, g in models) + " |")

@@ -272,7 +272,7 @@ pub(crate) fn due<'a>(anchors: impl Iterator<Item = &'a Anchor>, shape: &FieldSh
         .collect();
     let lag = |level: usize| lags[level].1.max(lags[level].2);
     let worst = (0..lags.len()).max_by(|a, b| lag(*a).total_cmp(&lag(*b))).unwrap_or(0);
-    if !(lag(worst) < MOST_LAG) {
+    if lag(worst).is_nan() || lag(worst) >= MOST_LAG {
         return Due::Whole;
     }
     let levels = lags.iter().enumerate().map(|(level, (anchor, _, clouds))| {

@@ -324,7 +324,8 @@ mod tests {
     #[test]
     fn a_drifting_sun_needs_one_level_per_frame() {
         let (before, mut after) = (sky(), sky());
-        after.sun.elevation += 0.3;
+        // Of the 0.32 degrees that the finest level may lag at this elevation.
+        after.sun.elevation += 0.4;
         let works = works(due_after(&before, &Now { params: &after, eye: DVec3::ZERO, time: 0.0 }));
         assert_eq!(works[0], Work { sweeps: DRIFT_SWEEPS, clouds: false });
         assert!(works[1..].iter().all(|work| work.sweeps == 0), "{works:?}");

@@ -268,20 +268,29 @@ struct Task<'a> {
     scratch: &'a Scratch,
 }
 
+impl Task<'_> {
+    /// Uniform block of a stage.
+    fn level(&self, stage: &Stage) -> FieldLevel {
+        level_block(stage, self.sun, self.coarser.map(|(coarser, offset)| (&coarser.stage, offset)))
+    }
+
+    /// Bindings of a dispatch for a level: those given take precedence.
+    fn bindings(&self, solution: &Solution, level: &FieldLevel, given: Bindings) -> Bindings {
+        // Without a level around it nothing of that is read.
+        let none = || Solution { optics: solution.densities.clone(), ..solution.clone() }.as_coarser();
+        let coarser = self.coarser.map_or_else(none, |(coarser, _)| coarser.as_coarser());
+        let own = vec![("level", uniform(&[level]))];
+        [own, given, self.scratch.bindings(), solution.as_level(), coarser, self.frame.clone()].concat()
+    }
+}
+
 /// Solves a stage. Returns the buffer of fluence and flux.
 fn solve<'a>(rec: &mut Recorder<'_>, solution: &Solution, task: &Task<'a>) -> &'a wgpu::Buffer {
-    let Task { sun, coarser, scratch, .. } = *task;
+    let Task { sun, scratch, .. } = *task;
     let stage = &solution.stage;
-    let around = coarser.map(|(coarser, offset)| (&coarser.stage, offset));
-    let level = level_block(stage, sun, around);
+    let level = task.level(stage);
     let count = stage.count() as u32;
-    // Without a level around it nothing of that is read.
-    let none = || Solution { optics: solution.densities.clone(), ..solution.clone() }.as_coarser();
-    let coarser_in = coarser.map_or_else(none, |(coarser, _)| coarser.as_coarser());
-    let bindings = |level: &FieldLevel, more: Bindings| -> Bindings {
-        let own = vec![("level", uniform(&[level]))];
-        [own, more, scratch.bindings(), solution.as_level(), coarser_in.clone(), task.frame.clone()].concat()
-    };
+    let bindings = |level: &FieldLevel, given: Bindings| task.bindings(solution, level, given);
     let [x, y, z] = stage.cells;
     if task.bakes {
         let out = vec![("volume_out", (&solution.densities).into())];
@@ -414,8 +423,7 @@ impl LightField {
             let textures = [densities, optics, sun, sky].map(|texture| Binding::from(texture).bytes());
             textures.iter().sum::<u64>() + entering.size()
         };
-        let shared = scratch.bindings().into_iter().filter(|(name, _)| *name != "few_radiances");
-        let shared = shared.map(|(_, binding)| binding.bytes()).sum();
+        let shared = scratch.bindings().into_iter().map(|(_, binding)| binding.bytes()).sum();
         vec![("levels", levels.iter().map(level).sum()), ("scratch", shared)]
     }
 
@@ -536,17 +544,12 @@ fn enter(
 /// Stores a level that has just been solved in the textures of all levels, and the light on the ground under it.
 fn store(rec: &mut Recorder<'_>, solution: &Solution, task: &Task<'_>, shape: &FieldShape, textures: &Textures) {
     let Some(number) = solution.stage.level else { return };
-    let around = task.coarser.map(|(coarser, offset)| (&coarser.stage, offset));
-    let level = level_block(&solution.stage, task.sun, around);
-    let coarser = task.coarser.map_or_else(|| solution.as_coarser(), |(coarser, _)| coarser.as_coarser());
+    let level = task.level(&solution.stage);
     let size = solution.stage.cells;
     let [optics_out, sun_out, sky_out] = &textures.levels;
     let out: Bindings =
         vec![("volume_out", optics_out.into()), ("sun_out", sun_out.into()), ("sky_out", sky_out.into())];
-    let bindings = |first_row: u32, out: Bindings| -> Bindings {
-        let own = vec![("level", uniform(&[&FieldLevel { first_row, ..level.clone() }]))];
-        [own, out, task.scratch.bindings(), solution.as_level(), coarser.clone(), task.frame.clone()].concat()
-    };
+    let bindings = |first_row: u32, out| task.bindings(solution, &FieldLevel { first_row, ..level.clone() }, out);
     rec.dispatch(("light_field", "field_store"), bindings(shape.rows_before(number), out), size);
     if solution.stage.sides != SIDES_OPEN {
         let map = vec![("map_out", (&textures.ground).into())];

@@ -540,3 +540,26 @@ def test_a_layer_against_paths(renderer, depth, below, pitch, low, high):
         ratios.append(closed / traced.mean())
     # The mean of both suns has a noise of 4 %.
     assert low < np.mean(ratios) < high
+
+
+@pytest.mark.parametrize("g", [0.85, 0.95])
+def test_the_ground_through_thin_clouds(g):
+    """Thin clouds from above, beside the path tracer: the ground's light that they scatter forward
+    is most of theirs. Without it their sum is 0.30 and 0.11 of that of the paths.
+    """
+    camera = nubis.Camera.look_at((3000, -2000, 9000), (6000, -1000, 0), fov_y=40)
+    changes = {
+        "light.g": g,
+        "clouds.extinction": 0.004,
+        "atmosphere.enabled": False,
+        "atmosphere.ground_albedo": (0.5,) * 3,
+        "high_clouds.coverage": 0.0,
+    }
+    _, params = multiple("fair_weather")
+    params = params.with_(**changes)
+    paths = nubis.quality("balanced").replace(integrator="path", path_samples=128)
+    got, want = (
+        nubis.Renderer(16, 16, quality=quality).render_layers(camera, params)["radiance"]
+        for quality in ("high", paths)
+    )
+    assert got.sum() == pytest.approx(want.sum(), rel=0.06)

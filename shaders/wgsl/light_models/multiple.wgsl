@@ -203,14 +203,30 @@ fn once_turned(turned: Turn, beam: f32, scaled_beam: f32, chains: f32) -> f32 {
     return params.light.albedo * (turned.phase * beam + chains + turn * (scaled_beam - beam));
 }
 
+// Light of the background, sky or ground, that clouds have scattered forward.
 fn forward_background(direction: vec3f, transmittance: f32, depth: f32) -> vec3f {
     let share = max(exp(-frame.sky.split.z * depth) - transmittance, 0.0);
-    var behind = params.light.ambient;
+    var behind = vec3f(0.0);
+    let ground = hit_sphere(direction, frame.view.power_ground);
     if AIR {
-        let way = air_segment(direction);
-        if !way.grounded {
-            behind += params.light.ambient_gain * sky_radiance(direction);
+        let sky = sky_radiance(direction);
+        let air = whole_air(direction, air_segment(direction), air_texels(direction), sky);
+        behind = air.radiance;
+        if ground.enters {
+            behind += air.transmittance * shaded_ground(ground.near * direction);
         }
+    } else if ground.enters {
+        behind = shaded_ground(ground.near * direction);
     }
-    return share * behind;
+    return share * (params.light.ambient + params.light.ambient_gain * behind);
+}
+
+// Radiance of the ground at a point, in sunlight averaged over a cell of the field.
+fn shaded_ground(p: vec3f) -> vec3f {
+    let altitude = altitude_at(p);
+    let mu = cos_zenith_at(p, frame.sky.sun_direction);
+    if VOLUME {
+        return ground_radiance(mu);
+    }
+    return ground_under(p, mu, field_ground_at(field_place(p, altitude).xy).z);
 }

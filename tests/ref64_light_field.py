@@ -51,11 +51,13 @@ def lines(shape, cell, direction, periodic):
     steep = abs(d[2]) > 0.5 or TILT / np.sqrt(1 - TILT**2) * min(cell[:2]) > cell[2]
     if steep:
         shift = abs(d[:2]) / abs(d[2]) * cell[2] / np.asarray(cell[:2])
+        first = 1 if step[2] > 0 else 21 - nz  # rows since that where staircases begin
         for j in range(ny):
             for i in range(nx):
                 cells = []
                 for m in range(nz):
-                    moved = np.floor(shift * m + 0.5).astype(int)
+                    moved = np.floor(shift * (first + m) + 0.5).astype(int)
+                    moved -= np.floor(shift * first + 0.5).astype(int)
                     x, y = i + step[0] * moved[0], j + step[1] * moved[1]
                     z = m if step[2] > 0 else nz - 1 - m
                     cells.append((z, y % ny, x % nx, (x // nx, y // ny), 0))

@@ -17,6 +17,8 @@ pub(crate) struct FieldShape {
     pub cell: [f32; 3],
     /// Altitude of the base of the lowest row, m; of a grid, the base of its box less a cell.
     pub base: f32,
+    /// Number of the lowest row: row 0 begins at the base of the lower deck, at any shell.
+    pub lowest: i32,
     /// Number of levels. Each has as many cells as the one before across and along, twice as wide.
     pub levels: u32,
     /// Number of levels beyond the finest whose rows are twice as high as those of the level before. Rows of further
@@ -24,11 +26,14 @@ pub(crate) struct FieldShape {
     pub halvings: u32,
 }
 
-/// Smallest number of rows of a level of clouds: half as many are too few for decks that fill a third of the shell
+/// Smallest number of rows of a deck: half as many are too few for decks that fill a third of the shell
 /// (docs/notes/accuracy.md).
 const LEAST_ROWS: u32 = 20;
-/// Largest number of rows.
-const MOST_ROWS: u32 = 64;
+/// Largest number of rows of the shell.
+const MOST_ROWS: u32 = 60;
+/// Part of a row by which the shell may reach into the empty row beyond its last. The shell ends at a multiple of the
+/// height in many skies; there a little more of it adds no row.
+const IN_EMPTY_ROW: f32 = 0.25;
 /// Number of cells along a side of a grid that a grid of fewer voxels has, too; with fewer rows cells are flat.
 const FEWEST_CELLS: f32 = 16.0;
 /// Largest number of cells of a grid's level: its radiances, of 72 bytes per cell, fit a buffer of 128 MiB.
@@ -78,32 +83,38 @@ impl FieldShape {
             let cells = [count(side.x, wide), count(side.y, wide), count(side.z, height)];
             let cell: [f32; 3] = std::array::from_fn(|axis| side[axis] / cells[axis] as f32);
             // An empty cell on each side: the light at a face is between that of a cell inside and one outside.
-            return Self { cells: cells.map(|n| n + 2), cell, base: low.z as f32 - cell[2], levels: 1, halvings: 0 };
+            return Self { cells: cells.map(|n| n + 2), cell, base: low.z as f32 - cell[2], lowest: 0, levels: 1, halvings: 0 };
         }
         let [base, top] = params.shell();
-        let thick = top - base;
         // Cells double with the altitude of the eye, as pixels do.
         let wide = cell * (altitude.max(top) / 12_000.0).max(1.0).log2().floor().exp2();
-        let thinnest = if params.has_upper_clouds() {
-            (params.clouds.top - params.clouds.base).min(params.upper_clouds.top - params.upper_clouds.base)
-        } else {
-            thick
-        };
-        let height = wide.min(thinnest / LEAST_ROWS as f32);
+        // Rows have fixed places relative to the lower deck, and their height changes with the decks continuously: what
+        // is switched on adds rows, and leaves the others alone.
+        let height = (wide.min(params.thinnest_deck() / LEAST_ROWS as f32)).max((top - base) / MOST_ROWS as f32);
         // An empty row below and above the clouds, as beside a grid.
-        let rows = ((thick / height).ceil() as u32 + 2).clamp(LEAST_ROWS, MOST_ROWS);
-        let halvings = (rows / LEAST_ROWS).ilog2();
-        let rows = rows.next_multiple_of(1 << halvings);
-        let height = thick / (rows - 2) as f32;
+        let row = |altitude: f32| (altitude - params.clouds.base) / height;
+        let lowest = (row(base) + IN_EMPTY_ROW).floor() as i32 - 1;
+        let end = (row(top) - IN_EMPTY_ROW).ceil() as i32 + 1;
+        let halvings = ((end - lowest) as u32 / LEAST_ROWS).max(1).ilog2();
+        // Rows of the coarser levels are whole numbers of these.
+        let together = 1 << halvings;
+        let lowest = together * lowest.div_euclid(together);
+        let rows = ((end - lowest) as u32).next_multiple_of(1 << halvings);
         let wide = wide.max(height);
         let levels = (REACH / (0.5 * wide * across as f32)).max(1.0).log2().ceil() as u32 + 1;
         let (cells, cell) = ([across, across, rows], [wide, wide, height]);
-        Self { cells, cell, base: base - height, levels: levels.clamp(1, 8), halvings }
+        let base = params.clouds.base + lowest as f32 * height;
+        Self { cells, cell, base, lowest, levels: levels.clamp(1, 8), halvings }
     }
 
     /// Rows of a level.
     pub fn rows(&self, level: u32) -> u32 {
         self.cells[2] >> level.min(self.halvings)
+    }
+
+    /// Number of the lowest row of a level.
+    pub fn lowest(&self, level: u32) -> i32 {
+        self.lowest >> level.min(self.halvings)
     }
 
     /// Rows of all levels before one.
@@ -294,7 +305,8 @@ pub(crate) fn due<'a>(anchors: impl Iterator<Item = &'a Anchor>, shape: &FieldSh
 mod tests {
     use super::*;
 
-    const SHAPE: FieldShape = FieldShape { cells: [64, 64, 20], cell: [100.0; 3], base: 0.0, levels: 5, halvings: 0 };
+    const SHAPE: FieldShape =
+        FieldShape { cells: [64, 64, 20], cell: [100.0; 3], base: 0.0, lowest: 0, levels: 5, halvings: 0 };
 
     fn sky() -> Params {
         let mut params = Params::default();

@@ -805,6 +805,16 @@ impl Params {
         shown(self.upper_clouds.coverage)
     }
 
+    /// Thickness of the thinner deck in m: of a deck that appears, continuously (`shown`).
+    pub fn thinnest_deck(&self) -> f32 {
+        let lower = self.clouds.top - self.clouds.base;
+        if !self.has_upper_clouds() {
+            return lower;
+        }
+        let upper = self.upper_clouds.top - self.upper_clouds.base;
+        lerp(upper, lerp(lower, lower.min(upper), self.upper_shown()), shown(self.clouds.coverage))
+    }
+
     /// Highest altitude of the lower deck in m. It grows with the towers of the heaviest precipitation, before anvils
     /// appear (`tower` and `anvil` of density.wgsl).
     pub fn lower_top(&self) -> f32 {

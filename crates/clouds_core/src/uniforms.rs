@@ -287,6 +287,9 @@ crate::params! {
         coarser_offset: [f32; 2] = [0.0; 2];
         /// First row in the textures of all levels.
         first_row: u32 = 0;
+        /// Number of the lowest row. Staircases along directions are tied to it: a row that is added above or below
+        /// leaves those of the others alone.
+        lowest: f32 = 0.0;
         /// Unit vector toward the sun, in the axes of the field.
         sun: [f32; 3] = [0.0, 0.0, 1.0];
         /// Whether the sun reaches the clouds.

@@ -89,6 +89,8 @@ struct Solved {
 struct Stage {
     cells: [u32; 3],
     cell: [f32; 3],
+    /// Number of the lowest row.
+    lowest: i32,
     sides: u32,
     sweeps: u32,
     /// Level of the field that it is, if any.
@@ -198,6 +200,7 @@ fn stages(shape: &FieldShape, sides: u32, level_sweeps: [u32; 2]) -> Vec<Stage> 
     let outermost = Stage {
         cells: [shape.cells[0], shape.cells[1], shape.rows(last)],
         cell: shape.cell(last),
+        lowest: shape.lowest(last),
         sides,
         sweeps: 0,
         level: Some(last),
@@ -224,7 +227,8 @@ fn stages(shape: &FieldShape, sides: u32, level_sweeps: [u32; 2]) -> Vec<Stage> 
     for level in (0..last).rev() {
         let cells = [shape.cells[0], shape.cells[1], shape.rows(level)];
         let sweeps = level_sweeps[usize::from(level == 0)];
-        cascade.push(Stage { cells, cell: shape.cell(level), sides: SIDES_COARSER, sweeps, level: Some(level) });
+        let (cell, lowest) = (shape.cell(level), shape.lowest(level));
+        cascade.push(Stage { cells, cell, lowest, sides: SIDES_COARSER, sweeps, level: Some(level) });
     }
     cascade
 }
@@ -382,6 +386,7 @@ fn level_block(stage: &Stage, sun: &Sun, coarser: Option<(&Stage, DVec2)>) -> Fi
         across: stage.cells[0],
         along: stage.cells[1],
         rows: stage.cells[2],
+        lowest: stage.lowest as f32,
         sides: stage.sides,
         cell: stage.cell,
         sun: sun.toward,
@@ -611,7 +616,7 @@ pub(crate) fn solve_cells(rec: &mut Recorder<'_>, cells: &Cells<'_>, params: &pa
     frame.sky.extinction = 1.0;
     let bindings = frame.bindings(rec.gpu).to_vec();
     let sides = if cells.periodic { SIDES_PERIODIC } else { SIDES_OPEN };
-    let stage = Stage { cells: cells.size, cell: cells.cell, sides, sweeps: cells.sweeps, level: None };
+    let stage = Stage { cells: cells.size, cell: cells.cell, lowest: 0, sides, sweeps: cells.sweeps, level: None };
     let scratch = Scratch::new(rec.gpu, std::slice::from_ref(&stage));
     let sun = Sun { toward: cells.sun, is_up: true, bend: 0.0 };
     let texel = |v: &f32| [half::f16::from_f32(*v), half::f16::ZERO, half::f16::ZERO, half::f16::ZERO];
@@ -633,7 +638,7 @@ mod tests {
     /// Levels lie in the middle of coarser ones, and the cascade ends at the outermost.
     #[test]
     fn stages_go_from_the_coarsest_to_the_finest() {
-        let shape = FieldShape { cells: [64, 64, 20], cell: [100.0, 100.0, 100.0], base: 0.0, levels: 5, halvings: 1 };
+        let shape = FieldShape { cells: [64, 64, 20], cell: [100.0; 3], base: 0.0, lowest: -2, levels: 5, halvings: 1 };
         let stages = stages(&shape, SIDES_PERIODIC, LEVEL_SWEEPS);
         let levels: Vec<_> = stages.iter().map(|stage| stage.level).collect();
         assert_eq!(levels, [None, None, None, None, Some(4), Some(3), Some(2), Some(1), Some(0)]);

@@ -543,10 +543,10 @@ class Light(Block):
 
     model: Literal[
         "single", "nubis2015", "thesis2018", "vsu2022", "octaves", "multiple", "path"
-    ] = "octaves"
+    ] = "multiple"
     phase: Literal["henyey_greenstein", "droplet", "mie"] = "henyey_greenstein"
     droplet_diameter: float = 20.0
-    g: float = 0.6
+    g: float = 0.85
     g_back: float = -0.25
     lobe_mix: float = 0.5
     albedo: float = 0.999

@@ -105,7 +105,7 @@ override LIGHT_CHEAP: bool = true; // light samples without detail noise
 // Radiance by direction, of sun and sky: mean in each cell, and what enters at the sides, in pairs of half floats.
 @group(0) @binding(93) var<storage, read_write> radiances: array<u32>;
 @group(0) @binding(95) var<storage, read_write> entering: array<u32>;
-@group(0) @binding(96) var<storage, read_write> balance: array<vec4f>; // factor on the sunlight of all cells
+@group(0) @binding(96) var<storage, read_write> balance: array<vec4f>; // `field_balance`
 @group(0) @binding(97) var sun_out: texture_storage_3d<rgba16float, write>;
 @group(0) @binding(98) var sky_out: texture_storage_3d<rgba16float, write>;
 // Light on the ground by place, levels stacked: diffuse irradiance of a sun of irradiance 1; irradiance of a uniform

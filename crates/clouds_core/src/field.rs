@@ -182,7 +182,7 @@ pub(crate) struct Work {
 }
 
 /// Lag up to which the finest level is not solved anew: angle of the sun in degrees. The n-th level may lag n times as
-/// far, as may its clouds.
+/// far, as may its drift.
 const SUN_LAG: f64 = 0.25;
 /// Sine of the elevation at which the sun may lag by that: at others in proportion, down to a part of it. At a low sun
 /// shadows are long.
@@ -190,8 +190,9 @@ const LAG_SINE: f64 = 0.5;
 const LEAST_LAG: f64 = 0.4;
 /// Lag of the eye, as `SUN_LAG`: distance from the middle of the level in m.
 const EYE_LAG: f64 = 600.0;
-/// Lag of clouds that form, as `SUN_LAG`: change of the coverage, or fraction of the weather that differs.
-const CLOUD_CHANGE: f64 = 0.02;
+/// Lag of clouds that form: change of the coverage, or fraction of the weather that differs. The same for all levels: a
+/// change of 0.01 is 6 % of the brightness of `fair_weather`.
+const CLOUD_CHANGE: f64 = 0.003;
 /// Sweeps of a level that follows a drifting sky, without acceleration: Chebyshev's iteration overshoots where the field
 /// is right already.
 const DRIFT_SWEEPS: u32 = 2;
@@ -199,7 +200,7 @@ const DRIFT_SWEEPS: u32 = 2;
 /// solved per frame.
 const URGENT_LAG: f64 = 1.5;
 /// Lag in units of the above from which on the field is solved from nothing.
-const MOST_LAG: f64 = 8.0;
+const MOST_LAG: f64 = 2.5;
 
 /// Position and time on the grid of stills.
 pub(crate) fn origin(eye: DVec3, params: &Params, time: f64) -> Origin {
@@ -234,9 +235,8 @@ impl Anchor {
         on_chart(now.eye, now.params) - self.place - self.advection(now).drift().truncate()
     }
 
-    /// Lag of sun and of clouds behind a picture, in units of the lags allowed for the finest level. Infinite for another
-    /// sky.
-    fn lag(&self, now: &Now<'_>) -> [f64; 2] {
+    /// Lag of sun and of clouds behind a picture, in units of the lags allowed for a level. Infinite for another sky.
+    fn lag(&self, level: usize, now: &Now<'_>) -> [f64; 2] {
         let (old, new) = (&self.params, now.params);
         let planet = |params: &Params| params.atmosphere.planet_radius;
         let clouds = params::Clouds { coverage: new.clouds.coverage, ..old.clouds.clone() };
@@ -247,16 +247,17 @@ impl Anchor {
         }
         let toward = sun_direction(new);
         let allowed = SUN_LAG * (toward.z.abs() / LAG_SINE).clamp(LEAST_LAG, 1.0 / LAG_SINE);
-        let sun = self.sun.angle_between(toward).to_degrees() / allowed;
+        let more = (level + 1) as f64;
+        let sun = self.sun.angle_between(toward).to_degrees() / (more * allowed);
         if new.volume.is_some() {
             return [sun, 0.0];
         }
         let formed =
             f64::from(new.weather_change(old)).max(f64::from((old.clouds.coverage - new.clouds.coverage).abs()));
         let lags = [
-            self.advection(now).spread(new.has_upper_clouds()) / CLOUD_STEP,
+            self.advection(now).spread(new.has_upper_clouds()) / (more * CLOUD_STEP),
             formed / CLOUD_CHANGE,
-            self.eye(now).abs().max_element() / EYE_LAG,
+            self.eye(now).abs().max_element() / (more * EYE_LAG),
         ];
         // Displacements beyond the range of f64 give NaN.
         [sun, lags.into_iter().fold(0.0, |a, b| if b <= a { a } else { b })]
@@ -277,7 +278,7 @@ pub(crate) fn due<'a>(anchors: impl Iterator<Item = &'a Anchor>, shape: &FieldSh
     let lags: Vec<_> = anchors
         .enumerate()
         .map(|(level, anchor)| {
-            let [sun, clouds] = anchor.lag(now).map(|lag| lag / (level + 1) as f64);
+            let [sun, clouds] = anchor.lag(level, now);
             (anchor, sun, clouds)
         })
         .collect();

@@ -361,7 +361,7 @@ params! {
         /// published models. `octaves` approximates multiple scattering (Wrenninge et al. 2013, Hillaire 2016).
         /// `multiple` has every order of scattering, from a light field that is solved for the clouds.
         /// `path` traces paths of every order of scattering and is the reference of the others.
-        model: Model = Model::Octaves;
+        model: Model = Model::Multiple;
         /// Phase function. `henyey_greenstein` has the parameter `g` (in thesis2018 and vsu2022 `g_back`, too), as
         /// published. `droplet` is a fit to cloud droplets, which gives clouds a silver lining (Jendersie and d'Eon
         /// 2023). `mie` is Mie scattering by droplets, with fogbow and glory. `droplet` and `mie` scatter half of the
@@ -371,7 +371,7 @@ params! {
         droplet_diameter: f32 = 20.0, in 5..=50 "µm";
         /// Asymmetry parameter (mean cosine) of the forward lobe of the phase function: 0.85 for droplets. `octaves` is
         /// fitted for 0.6, which suits the published models, too.
-        g: f32 = 0.6, in -0.9999..=0.9999 "";
+        g: f32 = 0.85, in -0.9999..=0.9999 "";
         /// Asymmetry parameter (mean cosine) of the backward lobe (thesis2018, vsu2022).
         g_back: f32 = -0.25, in -0.9999..=0.9999 "";
         /// Weight of the forward lobe (vsu2022).

@@ -285,6 +285,8 @@ crate::params! {
         coarser_scale: [f32; 3] = [1.0; 3];
         /// Position of the middle relative to that of the coarser level, in cells of that.
         coarser_offset: [f32; 2] = [0.0; 2];
+        /// Whether the moments to begin with are the level's own: `coarser` is itself.
+        continues: u32 = 0;
         /// First row in the textures of all levels.
         first_row: u32 = 0;
         /// Number of the lowest row. Staircases along directions are tied to it: a row that is added above or below

@@ -397,10 +397,10 @@ impl Going {
     }
 }
 
-/// Upper bound of the speed of shadow casters, m/s.
+/// Upper bound of the speed of shadow casters, m/s; of a deck that appears, continuously.
 pub(crate) fn fastest(params: &Params) -> f64 {
     let wind = &params.wind;
-    let upper = if params.has_upper_clouds() { params.upper_clouds.speed.abs() } else { 0.0 };
+    let upper = params.upper_shown() * params.upper_clouds.speed.abs();
     let level = wind.speed.abs().max(wind.weather_speed.abs()).max(upper) * (1.0 + params.wind_variation.wind);
     f64::from(level.max(wind.updraft.abs()))
 }

@@ -264,17 +264,17 @@ fn lost_at(at: vec3i, depth: f32, extinction: f32) -> f32 {
     return lost.x + lost.y + lost.z;
 }
 
-var<workgroup> partial: array<vec2f, 256>;
+var<workgroup> partial: array<vec3f, 256>;
 
 // Ratio of the light that the sun loses in the level, by its transmittance at the faces, to what the cells take from
-// it.
+// it. Mean scaled sunlight on what scatters it, and its ratio to that when the level was last solved.
 @compute @workgroup_size(256)
 fn field_balance(@builtin(local_invocation_id) id: vec3u) {
     let size = level_size();
     let count = size.x * size.y * size.z;
     let volume = level.cell.x * level.cell.y * level.cell.z;
     let scale = frame.sky.split.z;
-    var sum = vec2f(0.0);
+    var sum = vec3f(0.0);
     let rounds = (count + 255u) / 256u;
     // The same number of iterations for all threads.
     for (var round = 0u; round < rounds; round++) {
@@ -283,16 +283,19 @@ fn field_balance(@builtin(local_invocation_id) id: vec3u) {
         let deposit = deposits[index];
         let at = cell_of(index);
         let lost = lost_at(at, scale * textureLoad(level_optics, at, 0).g, deposit.x);
-        sum += select(vec2f(0.0), vec2f(deposit.x * deposit.y * volume, lost), i < count);
+        sum += select(vec3f(0.0), vec3f(deposit.x * deposit.y * volume, lost, deposit.x * volume), i < count);
     }
     partial[id.x] = sum;
     workgroupBarrier();
     if id.x == 0u {
-        var whole = vec2f(0.0);
+        var whole = vec3f(0.0);
         for (var i = 0u; i < 256u; i++) {
             whole += partial[i];
         }
-        balance[0] = vec4f(clamp(whole.y / max(whole.x, 1e-20), 0.25, 4.0), whole, 0.0);
+        let factor = clamp(whole.y / max(whole.x, 1e-20), 0.25, 4.0);
+        let mean = factor * whole.x / max(whole.z, 1e-20);
+        let before = balance[0].y;
+        balance[0] = vec4f(factor, mean, select(1.0, mean / before, before > 0.0), 0.0);
     }
 }
 
@@ -327,7 +330,8 @@ fn packed(radiance: vec2f) -> u32 {
     return pack2x16float(nearest_half(vec4f(radiance, 0.0, 0.0)).xy);
 }
 
-// Moments to begin with: those of the coarser level, or none.
+// Moments to begin with: those of the coarser level, or none, or the level's own of before. These change with the mean
+// sunlight on what scatters it: deep decks have slow modes, which the few sweeps of a moving sun do not reach.
 @compute @workgroup_size(64)
 fn field_start(@builtin(global_invocation_id) id: vec3u) {
     let size = level_size();
@@ -337,6 +341,9 @@ fn field_start(@builtin(global_invocation_id) id: vec3u) {
     var moments = Moments(vec4f(0.0), vec4f(0.0));
     if level.coarser_rows > 0u {
         moments = coarser_moments(cell_of(id.x));
+    }
+    if level.continues > 0u {
+        moments.sun *= balance[0].z;
     }
     moments_now[2u * id.x] = moments.sun;
     moments_now[2u * id.x + 1u] = moments.sky;

@@ -107,6 +107,8 @@ struct Solution {
     sky: wgpu::TextureView,
     /// Radiance that enters at the sides.
     entering: wgpu::Buffer,
+    /// Light that the sun loses, now and before.
+    balance: wgpu::Buffer,
 }
 
 /// Buffers that the stages share while they are solved.
@@ -114,7 +116,6 @@ struct Scratch {
     moments: [wgpu::Buffer; 2],
     deposits: wgpu::Buffer,
     radiances: wgpu::Buffer,
-    balance: wgpu::Buffer,
 }
 
 impl Scratch {
@@ -124,7 +125,6 @@ impl Scratch {
             moments: ["moments", "moments"].map(|label| gpu.buffer(label, 32 * most)),
             deposits: gpu.buffer("deposits", 8 * most),
             radiances: gpu.buffer("radiances", 4 * DIRECTIONS * most),
-            balance: gpu.buffer("balance", 16),
         }
     }
 
@@ -134,7 +134,6 @@ impl Scratch {
             ("moments_before", (&self.moments[1]).into()),
             ("deposits", (&self.deposits).into()),
             ("radiances", (&self.radiances).into()),
-            ("balance", (&self.balance).into()),
         ]
     }
 }
@@ -146,7 +145,8 @@ impl Solution {
         let [densities, optics] = ["densities", "optics"].map(texture);
         let [sun, sky] = ["sun", "sky"].map(texture);
         let entering = gpu.buffer("entering", 4 * DIRECTIONS * stage.rim());
-        Self { densities, optics, sun, sky, entering, stage }
+        let balance = gpu.buffer("balance", 16);
+        Self { densities, optics, sun, sky, entering, balance, stage }
     }
 
     /// Bindings as the level that is solved.
@@ -156,6 +156,7 @@ impl Solution {
             ("level_sun", (&self.sun).into()),
             ("level_sky", (&self.sky).into()),
             ("entering", (&self.entering).into()),
+            ("balance", (&self.balance).into()),
         ]
     }
 
@@ -310,7 +311,10 @@ fn solve<'a>(rec: &mut Recorder<'_>, solution: &Solution, task: &Task<'a>) -> &'
     }
     // The field to begin with: that of the level around it, or its own.
     let (start, from) = match task.moved {
-        Some((moved, _)) => (level_block(stage, sun, Some((stage, moved))), solution.as_coarser()),
+        Some((moved, _)) => {
+            let own = FieldLevel { continues: u32::from(!task.bakes), ..level_block(stage, sun, Some((stage, moved))) };
+            (own, solution.as_coarser())
+        }
         None => (level.clone(), vec![]),
     };
     let few = stage.is_small();
@@ -424,9 +428,9 @@ impl LightField {
     pub fn kept(&self) -> Vec<(&'static str, u64)> {
         let Some((Solved { levels, scratch, .. }, _)) = &self.animated else { return Vec::new() };
         let level = |(_, level): &(Anchor, Solution)| -> u64 {
-            let Solution { densities, optics, sun, sky, entering, .. } = level;
+            let Solution { densities, optics, sun, sky, entering, balance, .. } = level;
             let textures = [densities, optics, sun, sky].map(|texture| Binding::from(texture).bytes());
-            textures.iter().sum::<u64>() + entering.size()
+            textures.iter().sum::<u64>() + entering.size() + balance.size()
         };
         let shared = scratch.bindings().into_iter().map(|(_, binding)| binding.bytes()).sum();
         vec![("levels", levels.iter().map(level).sum()), ("scratch", shared)]
@@ -625,7 +629,7 @@ pub(crate) fn solve_cells(rec: &mut Recorder<'_>, cells: &Cells<'_>, params: &pa
     rec.gpu.write_texture(densities, &cells.extinction.iter().map(texel).collect::<Vec<_>>());
     let (frame, scratch) = (&bindings, &scratch);
     let moments = solve(rec, &solution, &Task { sun: &sun, coarser: None, moved: None, bakes: false, frame, scratch });
-    for buffer in [moments, &scratch.deposits, &scratch.balance] {
+    for buffer in [moments, &scratch.deposits, &solution.balance] {
         rec.download(buffer, 0, buffer.size());
     }
     Ok(())

@@ -268,7 +268,7 @@ def test_soak_sees_faults():
 
 FAIR = nubis.scenes["fair_weather"]
 #: With one weather map, as the sources have.
-PLAIN = FAIR[0], FAIR[1].with_(**{"weather.broad_variety": 0.0})
+PLAIN = FAIR[0], FAIR[1].with_(**{"weather.broad_variety": 0.0, "light.model": "octaves"})
 
 
 @pytest.fixture(scope="module")

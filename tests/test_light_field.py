@@ -294,7 +294,7 @@ def test_a_sky_without_marched_clouds(renderer, high):
     """
     camera = nubis.Camera.look_at((0, 0, 200), (900, 700, 0), fov_y=40)
     params = nubis.Params().with_(
-        **{"clouds.coverage": 0.0, "high_clouds.coverage": high, "light.g": 0.85}
+        **{"clouds.coverage": 0.0, "high_clouds.coverage": high, "high_clouds.optical_depth": 0.5}
     )
     ground = {
         model: renderer(32, 18).render(camera, params.with_(**{"light.model": model}))[-6:]

@@ -54,7 +54,11 @@ def _make() -> dict[str, Params]:
             "clouds.coverage": 0.42,
             "upper_clouds.coverage": 0.55,
         },
-        "cirrus": {"clouds.coverage": 0.25, "high_clouds.coverage": 0.6},
+        "cirrus": {
+            "clouds.coverage": 0.25,
+            "high_clouds.coverage": 0.6,
+            "high_clouds.optical_depth": 2.0,
+        },
     }
     return {name: fair.with_(**fields) for name, fields in skies.items()}
 

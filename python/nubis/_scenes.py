@@ -48,7 +48,6 @@ def _make() -> dict[str, tuple[Camera, Params]]:
                 **{
                     "sun.elevation": 3.0,
                     "sun.azimuth": 258.0,
-                    "light.model": "octaves",
                     "light.phase": "droplet",
                 }
             ),
@@ -74,7 +73,7 @@ def _make() -> dict[str, tuple[Camera, Params]]:
                     "high_clouds.type": 1.0,
                     "high_clouds.coverage": 0.5,
                     "high_clouds.altitude": 4500.0,
-                    "high_clouds.optical_depth": 3.0,
+                    "high_clouds.optical_depth": 8.0,
                     "high_clouds.scale": 16000.0,
                     "high_clouds.stretch": 4.0,
                     "high_clouds.emboss": 0.6,

@@ -450,7 +450,7 @@ class HighClouds(Block):
     with_volume: bool = False
     type: float = 0.0
     altitude: float = 8500.0
-    optical_depth: float = 0.5
+    optical_depth: float = 1.0
     scale: float = 42000.0
     curve: Literal["exponential", "clamp"] = "exponential"
     emboss: float = 0.0

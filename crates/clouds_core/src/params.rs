@@ -328,7 +328,7 @@ params! {
         /// Altitude of the layer.
         altitude: f32 = 8500.0, in 100..=30000 "m";
         /// Vertical optical depth of the layer where it is thickest.
-        optical_depth: f32 = 0.5, in 0..=100 "";
+        optical_depth: f32 = 1.0, in 0..=100 "";
         /// Tile width of the texture.
         scale: f32 = 42000.0, in 1000..=1000000 "m";
         /// Mapping from texture to optical depth: `exponential` saturates and has soft edges and even cores

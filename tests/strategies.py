@@ -256,9 +256,13 @@ SLOW = [name for name in ("reference", "vsu2022", "high") if name in NAMES]
 FEW = {"steps_zenith": 32, "steps_horizon": 64, "light_steps": 6}
 
 
+# Each picture has a sky of its own, whose light field would take most of the time.
+FIELD = {"field_cells": 16, "field_cell": 400.0}
 # Paths are dear: two, and not for long.
 #: Every pixel is marched: a static shot becomes the still.
-DRAFT = nubis.quality("draft").replace(adaptive_threshold=0.0, path_samples=2, path_scatterings=64)
+DRAFT = nubis.quality("draft").replace(
+    adaptive_threshold=0.0, path_samples=2, path_scatterings=64, **FIELD
+)
 
 
 @st.composite
@@ -266,7 +270,7 @@ def qualities(draw):
     """A named method, or any with few samples."""
     named = draw(st.sampled_from([None, None, "draft", "draft", *NAMES]))
     if named:
-        method, slow = nubis.quality(named), named in SLOW
+        method, slow = nubis.quality(named).replace(**FIELD), named in SLOW
     else:
         values = {}
         for f in dataclasses.fields(Quality):

@@ -434,7 +434,7 @@ def test_clouds_shade_the_ground_without_air(renderer):
 
 
 @pytest.mark.slow_after(1)
-@pytest.mark.parametrize("model", ["octaves", "path"])
+@pytest.mark.parametrize("model", ["octaves", "multiple", "path"])
 def test_ground_without_air_lights_clouds(renderer, model):
     """By the ground's radiance, whatever the air: all that a cloud has which the sun's light does
     not reach through itself grows with the ground's albedo.
@@ -443,7 +443,12 @@ def test_ground_without_air_lights_clouds(renderer, model):
         np.full((4, 4, 4), 5e-3, np.float32), ((-300.0, -300.0, 900.0), (300.0, 300.0, 1500.0))
     )
     params = clear(
-        **{"atmosphere.enabled": False, "light.model": model, "light.ambient_occlusion": 0.0}
+        **{
+            "atmosphere.enabled": False,
+            "light.model": model,
+            "light.g": 0.6,
+            "light.ambient_occlusion": 0.0,
+        }
     )
     params = params.replace(volume=grid)
     camera = looking((0.0, 0.0, 1.0), 10.0, 20.0)

@@ -16,6 +16,7 @@ CAMERA = nubis.Camera.look_at((0, 0, 100), (300, 1000, 1200), fov_y=4)
 def lit(**changes):
     values = {
         "light.model": "single",
+        "light.g": 0.6,
         "light.albedo": 0.9,
         "sun.elevation": 50.0,
         "sun.azimuth": 70.0,

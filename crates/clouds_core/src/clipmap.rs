@@ -53,8 +53,10 @@ impl Origin {
     pub fn new(eye: DVec3, params: &Params, time: f64, step: f64) -> Self {
         let period = step / fastest(params).max(0.125);
         let place = (eye.truncate() / EYE_STEP).round();
-        let steps = [place.x as i64, place.y as i64, (time / period).floor() as i64];
-        Self { steps, place: EYE_STEP * place, time: period * (time / period).floor() }
+        // The nearest, as of the position: 0 s, where many skies begin, is no border.
+        let number = (time / period).round();
+        let steps = [place.x as i64, place.y as i64, number as i64];
+        Self { steps, place: EYE_STEP * place, time: period * number }
     }
 }
 

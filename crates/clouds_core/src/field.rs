@@ -131,7 +131,7 @@ impl FieldShape {
 }
 
 /// Sky of a picture.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq)]
 pub(crate) struct Now<'a> {
     pub params: &'a Params,
     pub eye: DVec3,
@@ -140,7 +140,7 @@ pub(crate) struct Now<'a> {
 }
 
 /// Sky that a level of the field is solved for.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Anchor {
     /// Middle of the level on the chart, m.
     pub place: DVec2,
@@ -273,8 +273,18 @@ impl Anchor {
     }
 }
 
-/// Levels that an animation needs solved, from their anchors, the finest first.
-pub(crate) fn due<'a>(anchors: impl Iterator<Item = &'a Anchor>, shape: &FieldShape, now: &Now<'_>) -> Due {
+/// Levels that an animation needs solved, from their anchors, the finest first. `rests` says whether the picture before
+/// has the same sky: a static shot becomes its still.
+pub(crate) fn due<'a>(
+    anchors: impl Iterator<Item = &'a Anchor> + Clone,
+    shape: &FieldShape,
+    now: &Now<'_>,
+    rests: bool,
+) -> Due {
+    let still = Anchor::still(now.eye, now.params, now.time);
+    if rests && anchors.clone().any(|anchor| *anchor != still) {
+        return Due::Whole;
+    }
     let lags: Vec<_> = anchors
         .enumerate()
         .map(|(level, anchor)| {
@@ -319,7 +329,7 @@ mod tests {
     /// Levels due at an eye and a time, after a still of `before` at 0 s.
     fn due_after(before: &Params, now: &Now<'_>) -> Due {
         let anchors = vec![Anchor::still(DVec3::ZERO, before, 0.0); 5];
-        due(anchors.iter(), &SHAPE, now)
+        due(anchors.iter(), &SHAPE, now, false)
     }
 
     fn works(due: Due) -> Vec<Work> {
@@ -358,6 +368,19 @@ mod tests {
         }
         let far = Now { params: &before, eye: DVec3::new(30e3, 0.0, 0.0), time: 0.0 };
         assert!(matches!(due_after(&before, &far), Due::Whole));
+    }
+
+    /// A level that lags less than it may is left alone while the sky moves, and solved as that of a still when it stops.
+    #[test]
+    fn a_sky_that_stops_is_that_of_a_still() {
+        let (before, mut after) = (sky(), sky());
+        after.sun.elevation += 0.1;
+        let now = Now { params: &after, eye: DVec3::ZERO, time: 0.0 };
+        let anchors = [Anchor::still(DVec3::ZERO, &before, 0.0)];
+        assert!(works(due(anchors.iter(), &SHAPE, &now, false)).iter().all(|work| work.sweeps == 0));
+        assert!(matches!(due(anchors.iter(), &SHAPE, &now, true), Due::Whole));
+        let anchors = [Anchor::still(DVec3::ZERO, &after, 0.0)];
+        assert!(works(due(anchors.iter(), &SHAPE, &now, true)).iter().all(|work| work.sweeps == 0));
     }
 
     /// Clouds that drift as one need no new light, and a level that follows the eye keeps its cells on the clouds.

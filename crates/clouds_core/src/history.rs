@@ -1,6 +1,7 @@
 //! History of an animation: the previous frame, the conditions of a cut, and accumulation.
 
 use crate::camera::Camera;
+use crate::field::Now;
 use crate::frame::Frame;
 use crate::gpu::Gpu;
 use crate::params::Params;
@@ -22,6 +23,11 @@ pub(crate) struct Past {
 }
 
 impl Past {
+    /// Sky of the frame.
+    pub fn now(&self) -> Now<'_> {
+        Now { params: &self.params, eye: self.camera.eye, time: self.time }
+    }
+
     /// Whether a shot is a cut: it differs from the previous frame by so much that the history is useless.
     pub fn is_cut(&self, shot: &Shot<'_>) -> bool {
         let Shot { camera, params: new, time, .. } = *shot;

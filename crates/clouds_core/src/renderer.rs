@@ -141,7 +141,7 @@ impl Renderer {
             Target::Still { .. } => Due::Still,
             Target::Animation(_) => {
                 let now = Now { params: &params, eye: shot.camera.eye, time: shot.time };
-                self.luts.follow(&mut frame, past.is_some(), &now)
+                self.luts.follow(&mut frame, past.as_ref().map(Past::now), &now)
             }
         };
         let mut rec = Recorder::new(&self.gpu, &mut self.timings, interrupt);

@@ -816,7 +816,8 @@ enum Comparison {
 impl Comparison {
     /// Choices in the order of the menu.
     fn all() -> impl Iterator<Item = Self> {
-        let models = [Model::Single, Model::Nubis2015, Model::Thesis2018, Model::Vsu2022, Model::Octaves, Model::Path];
+        use Model::{Multiple, Nubis2015, Octaves, Path, Single, Thesis2018, Vsu2022};
+        let models = [Single, Nubis2015, Thesis2018, Vsu2022, Octaves, Multiple, Path];
         let qualities = Quality::NAMES.into_iter().map(Self::Quality);
         [Self::None].into_iter().chain(qualities).chain(models.map(Self::Light))
     }

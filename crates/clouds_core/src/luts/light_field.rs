@@ -410,13 +410,14 @@ fn level_block(stage: &Stage, sun: &Sun, coarser: Option<(&Stage, DVec2)>) -> Fi
 }
 
 impl LightField {
-    /// What a frame of an animation needs of the field. Sets the positions of its levels in the frame. `follows` says
-    /// whether the frame continues one before it.
-    pub fn follow(&self, frame: &mut Frame, follows: bool, now: &Now<'_>) -> Due {
+    /// What a frame of an animation needs of the field. Sets the positions of its levels in the frame. `before` is the
+    /// sky of the frame that it continues.
+    pub fn follow(&self, frame: &mut Frame, before: Option<Now<'_>>, now: &Now<'_>) -> Due {
         let Some(shape) = frame.field else { return Due::Still };
         let made = self.animated.as_ref().filter(|(solved, token)| token.is_submitted() && solved.shape == shape);
-        let Some((solved, _)) = made.filter(|_| follows) else { return Due::Whole };
-        let due = field::due(solved.levels.iter().map(|(anchor, _)| anchor), &shape, now);
+        let (Some((solved, _)), Some(before)) = (made, before) else { return Due::Whole };
+        let anchors = solved.levels.iter().map(|(anchor, _)| anchor);
+        let due = field::due(anchors, &shape, now, before == *now);
         if let Due::Levels(levels) = &due {
             frame.set_field_levels(&shape, |level| levels[level].0.eye(now));
         }

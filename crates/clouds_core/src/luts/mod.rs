@@ -94,9 +94,9 @@ impl Luts {
         self.light_shafts.update(rec, inputs) // on a step of clouds or eye or a new view, if clouds shade visible air
     }
 
-    /// What a frame of an animation needs of the light field. `follows`: it continues the frame before.
-    pub fn follow(&self, frame: &mut Frame, follows: bool, now: &Now<'_>) -> Due {
-        self.light_field.follow(frame, follows, now)
+    /// What a frame of an animation needs of the light field. `before` is the sky of the frame that it continues.
+    pub fn follow(&self, frame: &mut Frame, before: Option<Now<'_>>, now: &Now<'_>) -> Due {
+        self.light_field.follow(frame, before, now)
     }
 
     /// Weather map without the other LUTs.

@@ -417,8 +417,11 @@ def test_any_animation(data):
     for frame in make.animate(shots + shots[-1:] * 16, background=background):
         assert np.isfinite(frame).all() and frame.min() >= 0
         assert frame[..., 3].max() <= 1
+    # In the middle of the planet no direction is up, and rounding differs by five digits.
+    middle = np.linalg.norm(np.add(camera.eye, [0, 0, params.atmosphere.planet_radius])) < 1
     # A static shot goes on tracing paths.
-    assert params.light.model == "path" or frame.tobytes() == still.tobytes()
+    traced = params.light.model == "path"
+    assert middle or traced or frame.tobytes() == still.tobytes()
 
 
 def moved(camera, eye):

@@ -170,7 +170,7 @@ def test_clouds_are_seen_through_shaded_air():
 
 @pytest.mark.slow
 def test_switched_off_nothing_is_shaded():
-    """Nor in a clear sky, at night, without air, or over the clouds: the pictures are the same. With
+    """Nor in a clear sky, at night, without air, or over the clouds: the same pictures. With
     the light model `multiple` the light that clouds scatter to the air may be more than they take.
     """
     camera, params = nubis.scenes["fair_weather"]

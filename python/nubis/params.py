@@ -618,8 +618,8 @@ class Quality(Block):
     integrator : {march, reference, path}
         Integrator: `march`, the ray march that all settings but the last four belong to;
         `reference`, the ray march whose steps are halved until it converges to `tolerance`; `path`,
-        path tracing of every order of scattering with the light model `octaves`. Allowed: one of
-        "march", "reference", "path".
+        path tracing of every order of scattering with the light models `multiple` and `octaves`.
+        Allowed: one of "march", "reference", "path".
     steps_zenith : int
         Number of view steps of a ray toward the zenith. Allowed: a whole number from 1 to 4096.
     steps_horizon : int

@@ -83,7 +83,14 @@ impl FieldShape {
             let cells = [count(side.x, wide), count(side.y, wide), count(side.z, height)];
             let cell: [f32; 3] = std::array::from_fn(|axis| side[axis] / cells[axis] as f32);
             // An empty cell on each side: the light at a face is between that of a cell inside and one outside.
-            return Self { cells: cells.map(|n| n + 2), cell, base: low.z as f32 - cell[2], lowest: 0, levels: 1, halvings: 0 };
+            return Self {
+                cells: cells.map(|n| n + 2),
+                cell,
+                base: low.z as f32 - cell[2],
+                lowest: 0,
+                levels: 1,
+                halvings: 0,
+            };
         }
         let [base, top] = params.shell();
         // Cells double with the altitude of the eye, as pixels do.

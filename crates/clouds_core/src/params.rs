@@ -439,7 +439,7 @@ params! {
     Quality {
         /// Integrator: `march`, the ray march that all settings but the last four belong to; `reference`, the ray march
         /// whose steps are halved until it converges to `tolerance`; `path`, path tracing of every order of scattering
-        /// with the light model `octaves`.
+        /// with the light models `multiple` and `octaves`.
         integrator: Integrator = Integrator::March;
         /// Number of view steps of a ray toward the zenith.
         steps_zenith: u32 = 134, in 1..=4096 "";

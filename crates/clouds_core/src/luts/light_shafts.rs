@@ -58,7 +58,8 @@ impl LightShafts {
         let snapped = |place: DVec2| (place / STEP).round() * STEP;
         let place = snapped(place).to_array();
         let levels = frame.sky.field_levels.map(|[x, y, first, rows]| {
-            let [x, y] = (snapped(DVec2::new(x.into(), y.into()) + from.truncate() - eye.truncate())).as_vec2().to_array();
+            let [x, y] =
+                (snapped(DVec2::new(x.into(), y.into()) + from.truncate() - eye.truncate())).as_vec2().to_array();
             [x, y, first, rows]
         });
         let (sun, air, shadows) = (params.sun.clone(), params.atmosphere.clone(), shadow::key(inputs));

@@ -285,10 +285,10 @@ def test_what_sees_no_ground_bakes_nothing():
     assert not bakes(DOWN, **{"clouds.coverage": 0.0})
     # What was baked for the shaded air above is still there.
     assert not bakes(DOWN)
-    assert not bakes(DOWN, time=1.59)  # 32 m / 20 m/s: every 1.6 s
-    assert bakes(DOWN, time=1.61)
-    assert not bakes(DOWN, time=1.61)
-    assert bakes(DOWN, time=1.61, **{"sun.azimuth": 10.0})
+    assert not bakes(DOWN, time=0.79)  # 32 m / 20 m/s: every 1.6 s, for the times nearest to it
+    assert bakes(DOWN, time=0.81)
+    assert not bakes(DOWN, time=2.39)
+    assert bakes(DOWN, time=2.39, **{"sun.azimuth": 10.0})
 
 
 def test_pictures_do_not_depend_on_those_before():

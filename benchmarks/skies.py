@@ -12,6 +12,7 @@ the reference.
 from __future__ import annotations
 
 import argparse
+import functools
 from collections.abc import Iterator
 from typing import Any
 
@@ -89,16 +90,15 @@ def errors(
     reference = nubis.quality("reference")
     whole = np.ones(size[::-1], bool)
     aureole = near_sun(camera, params, size)
-    truths: dict[tuple[int, float], Layers] = {}
+
+    @functools.cache
+    def rendered(quality: nubis.Quality) -> Layers:
+        return nubis.Renderer(*size, quality=quality).render_layers(camera, params)
+
     for name in QUALITIES:
         quality = nubis.quality(name)
-        got = nubis.Renderer(*size, quality=quality).render_layers(camera, params)
-        cells = quality.field_cells, quality.field_cell
-        for key in (cells, (reference.field_cells, reference.field_cell)):
-            if key not in truths:
-                method = reference.replace(field_cells=key[0], field_cell=key[1])
-                truths[key] = nubis.Renderer(*size, quality=method).render_layers(camera, params)
-        own, best = truths[cells], truths[reference.field_cells, reference.field_cell]
+        cells = {"field_cells": quality.field_cells, "field_cell": quality.field_cell}
+        got, own, best = map(rendered, (quality, reference.replace(**cells), reference))
         yield (
             name,
             [error(got, own, whole), error(got, own, ~aureole), error(got, best, whole)],

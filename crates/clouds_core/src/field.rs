@@ -106,7 +106,7 @@ impl FieldShape {
         // Rows of the coarser levels are whole numbers of these.
         let together = 1 << halvings;
         let lowest = together * lowest.div_euclid(together);
-        let rows = ((end - lowest) as u32).next_multiple_of(1 << halvings);
+        let rows = ((end - lowest) as u32).next_multiple_of(together as u32);
         let wide = wide.max(height);
         let levels = (REACH / (0.5 * wide * across as f32)).max(1.0).log2().ceil() as u32 + 1;
         let (cells, cell) = ([across, across, rows], [wide, wide, height]);

@@ -216,6 +216,11 @@ impl App {
         self.time
     }
 
+    /// Exposure, stops.
+    pub fn exposure(&self) -> f32 {
+        self.exposure
+    }
+
     /// Whether the window is about to close.
     pub fn is_closing(&self) -> bool {
         self.closing
@@ -564,8 +569,10 @@ impl App {
         }
     }
 
+    /// One line whatever it says: a line more would change the size of the view, whose history starts anew.
     fn status(&mut self, ui: &mut Ui) {
-        ui.horizontal_wrapped(|ui| {
+        let is_report = self.notice.contains('\n');
+        ui.horizontal(|ui| {
             let flight = &self.flight;
             ui.monospace(format!("{:>3.0}° {:<2}", flight.azimuth, flight.compass()));
             ui.monospace(format!("{:>7.0} m", flight.eye.z));
@@ -577,8 +584,13 @@ impl App {
                 ui.monospace(format!("{width} x {height} {kind} {:.0} ms", 1e3 * frame.elapsed.as_secs_f64()));
             }
             ui.separator();
-            ui.label(&self.notice);
+            if !is_report {
+                ui.add(egui::Label::new(&self.notice).truncate());
+            }
         });
+        if is_report {
+            ui.label(&self.notice);
+        }
     }
 
     fn view(&mut self, ui: &mut Ui) -> egui::Response {

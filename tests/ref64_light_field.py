@@ -1,4 +1,4 @@
-"""Float64 reference implementation of passes/light_field.wgsl: one level of cells, swept along its
+"""Float64 reference implementation of passes/light_solver.wgsl: one level of cells, swept along its
 lattice of directions, in plain loops over cells.
 """
 
@@ -116,30 +116,19 @@ def sweep(extinction, cell, sources, sky, periodic):
     return moments
 
 
-def chebyshev(sweeps, spectrum=0.9):
-    """Factor on the change by a sweep, and weight of the step, for each sweep."""
-    mu, relaxation = spectrum / (2 - spectrum), 2 / (2 - spectrum)
-    weight = 1.0
-    for k in range(sweeps):
-        weight = (1.0, 1 / (1 - mu**2 / 2), 1 / (1 - mu**2 * weight / 4))[min(k, 2)]
-        yield relaxation, weight
-
-
 def solve(extinction, cell, sun, g, albedo, beam, *, periodic, sweeps):
-    """Fluence and flux of the sun's light and of the sky's by accelerated sweeps, for the true
-    extinction and a given scaled sunlight `beam`.
+    """Fluence and flux of the sun's light and of the sky's by plain sweeps, for the true extinction
+    and a given scaled sunlight `beam`.
     """
     _, scale, scaled_albedo, turned = split(g, albedo)
     factor = scaled_albedo / (4 * np.pi)
     sun = np.asarray(sun, float)
     result = []
     for sky, light in ((0.0, beam), (1.0, 0.0 * beam)):
-        now = before = np.zeros((4, *extinction.shape))
-        for relaxation, weight in chebyshev(sweeps):
-            flux = now[1:] - sun[:, None, None, None] * light
-            sources = factor * np.concatenate([(now[0] + light)[None], 3 * turned * flux])
-            swept = sweep(scale * extinction, cell, sources, sky, periodic)
-            stepped = now + relaxation * (swept - now)
-            before, now = now, before + weight * (stepped - before)
-        result.append(now)
+        moments = np.zeros((4, *extinction.shape))
+        for _ in range(sweeps):
+            flux = moments[1:] - sun[:, None, None, None] * light
+            sources = factor * np.concatenate([(moments[0] + light)[None], 3 * turned * flux])
+            moments = sweep(scale * extinction, cell, sources, sky, periodic)
+        result.append(moments)
     return result

@@ -72,7 +72,7 @@ def solve_light(
     sun: tuple[float, float, float],
     *,
     periodic: bool = True,
-    sweeps: int = 100,
+    cycles: int = 10,
     params: Params | None = None,
 ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32], npt.NDArray[np.float32], float]:
     """Return the light field of one level of cells, solved from no light.
@@ -87,8 +87,8 @@ def solve_light(
         Unit vector toward the sun.
     periodic : bool
         Whether the cells repeat in x and y; otherwise skylight alone enters at the sides.
-    sweeps : int
-        Number of sweeps.
+    cycles : int
+        Number of cycles.
     params : Params, optional
         Phase function and albedo.
 
@@ -105,7 +105,7 @@ def solve_light(
     cells = np.ascontiguousarray(extinction, np.float32)
     given = params or Params(light=Light(model="multiple"))
     core = Renderer(1, 1)._core
-    moments, deposits, factor = core.solve_light(cells, cell, sun, (periodic, sweeps), given)
+    moments, deposits, factor = core.solve_light(cells, cell, sun, (periodic, cycles), given)
     of_sun, of_sky = np.moveaxis(moments, -1, 0).reshape(2, 4, *cells.shape)
     return of_sun, of_sky, np.moveaxis(deposits, -1, 0), factor
 
@@ -116,7 +116,7 @@ def light_field(
     params: Params,
     *,
     time: float = 0.0,
-    sweeps: int = 1,
+    more_cycles: int = 0,
     animated: bool = False,
 ) -> tuple[npt.NDArray[np.float32], ...]:
     """Return the light field of a shot, with the light model ``"multiple"``.
@@ -128,8 +128,8 @@ def light_field(
     params : Params
     time : float
         Time in seconds.
-    sweeps : int
-        Factor on the numbers of sweeps.
+    more_cycles : int
+        Number of cycles of each level besides the planned ones.
     animated : bool
         Whether to return the field of the last frame of `Renderer.animate` instead, whatever the
         shot.
@@ -140,5 +140,5 @@ def light_field(
         Density, optical depth toward the sun; fluence and flux of light that has turned, for a sun
         of irradiance 1 and for a uniform sky of radiance 1. The rows of the finest level are first.
     """
-    textures = renderer._core.light_field(camera, params, time, (sweeps, animated))
+    textures = renderer._core.light_field(camera, params, time, (more_cycles, animated))
     return tuple(textures)

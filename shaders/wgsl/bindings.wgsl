@@ -7,7 +7,6 @@
 // (crates/clouds_core/src/specialization.rs).
 override PHASE: u32 = 0u; // light.phase
 override VOLUME: bool = false; // clouds from the user's grid instead of procedural ones
-override ALONE: bool = false; // a grid of the light field swept by one workgroup
 override KEEP_CLEAR: bool = false; // a region kept clear of clouds
 override CAMERA: u32 = 0u; // projection (camera.wgsl)
 override PRECISE: bool = false; // the user's grid read by loads in f32, not by hardware filters in half floats
@@ -95,17 +94,19 @@ override LIGHT_CHEAP: bool = true; // light samples without detail noise
 @group(0) @binding(102) var coarser_sky: texture_3d<f32>;
 // Fluence and flux: of the sun's light, then of the sky's.
 @group(0) @binding(88) var<storage, read_write> moments_now: array<vec4f>;
-@group(0) @binding(89) var<storage, read_write> moments_before: array<vec4f>;
+// A grid that corrects them (passes/light_field): what it has to correct, and the same and the correction of the coarser.
+@group(0) @binding(89) var<storage, read_write> residuals: array<vec4f>;
+@group(0) @binding(104) var<storage, read_write> coarser_residuals: array<vec4f>;
+@group(0) @binding(105) var<storage, read_write> coarser_correction: array<vec4f>;
 // Source functions of sun and sky, in pairs of half floats. A texture, since lavapipe loads each word of a buffer for
-// each lane by itself; a buffer where they are read in the dispatch that writes them.
+// each lane by itself.
 @group(0) @binding(91) var sources: texture_3d<u32>;
 @group(0) @binding(103) var sources_out: texture_storage_3d<rgba32uint, write>;
-@group(0) @binding(104) var<storage, read_write> few_sources: array<vec4u>;
 @group(0) @binding(92) var<storage, read_write> deposits: array<vec2f>; // scaled extinction, 1/m; scaled sunlight
 // Radiance by direction, of sun and sky: mean in each cell, and what enters at the sides, in pairs of half floats.
 @group(0) @binding(93) var<storage, read_write> radiances: array<u32>;
 @group(0) @binding(95) var<storage, read_write> entering: array<u32>;
-@group(0) @binding(96) var<storage, read_write> balance: array<vec4f>; // `field_balance`
+@group(0) @binding(96) var<storage, read_write> balance: array<f32>; // `field_balance`
 @group(0) @binding(97) var sun_out: texture_storage_3d<rgba16float, write>;
 @group(0) @binding(98) var sky_out: texture_storage_3d<rgba16float, write>;
 // Light on the ground by place, levels stacked: diffuse irradiance of a sun of irradiance 1; irradiance of a uniform

@@ -182,8 +182,8 @@ impl Due {
 /// What is done for a level of an animation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Work {
-    /// Number of sweeps; 0 if the level is up to date.
-    pub sweeps: u32,
+    /// Number of cycles; 0 if the level is up to date.
+    pub cycles: u32,
     /// Whether its clouds are new, besides its sun.
     pub clouds: bool,
 }
@@ -200,10 +200,9 @@ const EYE_LAG: f64 = 600.0;
 /// Lag of clouds that form: change of the coverage, or fraction of the weather that differs. The same for all levels: a
 /// change of 0.01 is 6 % of the brightness of `fair_weather`.
 const CLOUD_CHANGE: f64 = 0.003;
-/// Sweeps of a level that follows a drifting sky, without acceleration: Chebyshev's iteration overshoots where the field
-/// is right already.
-const DRIFT_SWEEPS: u32 = 2;
-/// Lag in units of the above from which on a level is solved at once, by twice as many sweeps; up to then one level is
+/// Cycles of multigrid of a level that follows a drifting sky.
+const DRIFT_CYCLES: u32 = 1;
+/// Lag in units of the above from which on a level is solved at once, by twice as many cycles; up to then one level is
 /// solved per frame.
 const URGENT_LAG: f64 = 1.5;
 /// Lag in units of the above from which on the field is solved from nothing.
@@ -309,12 +308,12 @@ pub(crate) fn due<'a>(
         if !urgent && (level != worst || lag(level) <= 1.0) {
             return ((*anchor).clone(), Work::default());
         }
-        let sweeps = DRIFT_SWEEPS * (1 + u32::from(urgent));
+        let cycles = DRIFT_CYCLES * (1 + u32::from(urgent));
         // With the sun the clouds are solved anew that would be due soon.
         if *clouds > 0.5 {
-            return (anchor.moved(shape.cell(level as u32), now), Work { sweeps, clouds: true });
+            return (anchor.moved(shape.cell(level as u32), now), Work { cycles, clouds: true });
         }
-        (Anchor { sun: sun_direction(now.params), ..(*anchor).clone() }, Work { sweeps, clouds: false })
+        (Anchor { sun: sun_direction(now.params), ..(*anchor).clone() }, Work { cycles, clouds: false })
     });
     Due::Levels(levels.collect())
 }
@@ -348,7 +347,7 @@ mod tests {
     fn a_sky_at_rest_needs_no_level() {
         let params = sky();
         let works = works(due_after(&params, &Now { params: &params, eye: DVec3::ZERO, time: 0.0 }));
-        assert!(works.iter().all(|work| work.sweeps == 0), "{works:?}");
+        assert!(works.iter().all(|work| work.cycles == 0), "{works:?}");
     }
 
     #[test]
@@ -357,8 +356,8 @@ mod tests {
         // Of the 0.32 degrees that the finest level may lag at this elevation.
         after.sun.elevation += 0.4;
         let works = works(due_after(&before, &Now { params: &after, eye: DVec3::ZERO, time: 0.0 }));
-        assert_eq!(works[0], Work { sweeps: DRIFT_SWEEPS, clouds: false });
-        assert!(works[1..].iter().all(|work| work.sweeps == 0), "{works:?}");
+        assert_eq!(works[0], Work { cycles: DRIFT_CYCLES, clouds: false });
+        assert!(works[1..].iter().all(|work| work.cycles == 0), "{works:?}");
     }
 
     #[test]
@@ -384,10 +383,10 @@ mod tests {
         after.sun.elevation += 0.1;
         let now = Now { params: &after, eye: DVec3::ZERO, time: 0.0 };
         let anchors = [Anchor::still(DVec3::ZERO, &before, 0.0)];
-        assert!(works(due(anchors.iter(), &SHAPE, &now, false)).iter().all(|work| work.sweeps == 0));
+        assert!(works(due(anchors.iter(), &SHAPE, &now, false)).iter().all(|work| work.cycles == 0));
         assert!(matches!(due(anchors.iter(), &SHAPE, &now, true), Due::Whole));
         let anchors = [Anchor::still(DVec3::ZERO, &after, 0.0)];
-        assert!(works(due(anchors.iter(), &SHAPE, &now, true)).iter().all(|work| work.sweeps == 0));
+        assert!(works(due(anchors.iter(), &SHAPE, &now, true)).iter().all(|work| work.cycles == 0));
     }
 
     /// Clouds that drift as one need no new light, and a level that follows the eye keeps its cells on the clouds.
@@ -401,11 +400,11 @@ mod tests {
         params.wind.detail_direction = params.wind.direction;
         params.wind.updraft = 0.0;
         let now = Now { params: &params, eye: DVec3::ZERO, time: 20.0 };
-        assert!(works(due_after(&params, &now)).iter().all(|work| work.sweeps == 0));
+        assert!(works(due_after(&params, &now)).iter().all(|work| work.cycles == 0));
         let now = Now { time: 40.0, ..now };
         let Due::Levels(levels) = due_after(&params, &now) else { panic!() };
         let (anchor, work) = &levels[0];
-        assert!(work.clouds && work.sweeps > 0, "{work:?}");
+        assert!(work.clouds && work.cycles > 0, "{work:?}");
         let before = Anchor::still(DVec3::ZERO, &params, 0.0);
         let cells = (before.eye(&now) - anchor.eye(&now)) / 100.0;
         assert!(cells.distance(cells.round()) < 1e-6 && cells.length() > 7.0, "{cells}");

@@ -44,7 +44,7 @@ pub mod wind;
 pub use camera::Camera;
 pub use error::{Error, Result};
 pub use gpu::{AdapterInfo, Gpu, adapters, disk_cache as cache};
-pub use luts::light_field::Cells;
+pub use luts::light_solver::Cells;
 pub use params::{Params, Quality};
 pub use passes::display::Screen;
 pub use renderer::Renderer;

@@ -12,7 +12,7 @@ use crate::gpu::Linked;
 use crate::gpu::{Download, Recorder, Which, texture_rows};
 use crate::gpu::{Interrupt, Timings, check_fork};
 use crate::gpu::{Program, Specialization};
-use crate::luts::light_field::{Cells, solve_cells};
+use crate::luts::light_solver::{Cells, solve_cells};
 use crate::luts::lut::params_block;
 use crate::luts::{Inputs, shadow};
 use crate::params::{Model, Params};
@@ -178,7 +178,7 @@ impl Renderer {
         self.run_points(&kernel, &Shot::new(&camera, params, time), inputs, 1 << 20, interrupt)
     }
 
-    /// Light field of given cells, solved from no light by a number of sweeps, with the phase function and the albedo of
+    /// Light field of given cells, solved from no light by a number of cycles, with the phase function and the albedo of
     /// `params`: fluence and flux of the sun's light and of the sky's, eight numbers per cell; scaled extinction in 1/m
     /// and scaled sunlight, two per cell; factor on the scaled sunlight. Tests call it.
     pub fn solve_light(
@@ -198,21 +198,21 @@ impl Renderer {
         Ok((moments, deposits, balance[0]))
     }
 
-    /// Textures of the light field of a shot, solved with every sweep made `times` times, or of the last frame of an
+    /// Textures of the light field of a shot, solved by `more` cycles besides the planned ones, or of the last frame of an
     /// animation: optics, fluence and flux of the sun's light and of the sky's, four half floats per cell, x first, the
     /// rows of the finest level first; and the number of texels along each axis. Tests call it.
     pub fn light_field(
         &mut self,
         shot: &Shot<'_>,
-        times: u32,
+        more: u32,
         animated: bool,
         interrupt: Interrupt<'_>,
     ) -> Result<([u32; 3], Vec<Vec<f32>>)> {
         check_fork()?;
         if !animated {
-            self.luts.light_field.more_sweeps = times - 1;
+            self.luts.light_field.more_cycles = more;
             let recorded = self.record(shot, true, interrupt).and_then(|(rec, _)| rec.submit());
-            self.luts.light_field.more_sweeps = 0;
+            self.luts.light_field.more_cycles = 0;
             recorded?;
         }
         let Some(textures) = self.luts.light_field.textures(animated) else { return Ok(([0; 3], Vec::new())) };

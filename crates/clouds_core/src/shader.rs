@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
-use crate::luts::{large_scale_weather, light_field, majorant, multiscatter, noise, shadow, sky, weather};
+use crate::luts::{large_scale_weather, light_solver, majorant, multiscatter, noise, shadow, sky, weather};
 use crate::params::{self, Model, Params, Quality};
 use crate::schema::{Block, wgsl_struct};
 use crate::uniforms::{Dispatch, FieldLevel, Sky, View};
@@ -90,7 +90,7 @@ fn constants_source() -> String {
         chart::constants,
         frame::constants,
         grid::constants,
-        light_field::constants,
+        light_solver::constants,
         gpu::device_constants,
         majorant::constants,
         moon::constants,

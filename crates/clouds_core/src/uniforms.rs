@@ -285,8 +285,8 @@ crate::params! {
         coarser_scale: [f32; 3] = [1.0; 3];
         /// Position of the middle relative to that of the coarser level, in cells of that.
         coarser_offset: [f32; 2] = [0.0; 2];
-        /// Whether the moments to begin with are the level's own: `coarser` is itself.
-        continues: u32 = 0;
+        /// Whether it is a grid that corrects a finer one: without sun and sky.
+        corrects: u32 = 0;
         /// First row in the textures of all levels.
         first_row: u32 = 0;
         /// Number of the lowest row. Staircases along directions are tied to it: a row that is added above or below
@@ -300,14 +300,10 @@ crate::params! {
         bend: f32 = 0.0;
         /// Whether the tilted directions cross a row in less than a cell, in flat cells.
         tilt_crosses: u32 = 0;
+        /// As `tilt_crosses`, of the coarser level.
+        coarser_tilt_crosses: u32 = 0;
         /// Largest number of cells that a ray toward the sun crosses in this level.
         sun_steps: u32 = 1;
-        /// Factor on the change by a sweep.
-        relaxation: f32 = 1.0;
-        /// Weight of a step of Chebyshev's iteration.
-        weight: f32 = 1.0;
-        /// Number of sweeps of a grid of few cells.
-        sweeps: u32 = 0;
     }
 }
 

@@ -610,9 +610,9 @@ impl Renderer {
         let [z, y, x]: [usize; 3] = extinction.shape().try_into().expect("three axes");
         let size = [x as u32, y as u32, z as u32];
         let extinction = extinction.as_slice()?.to_vec();
-        let (periodic, sweeps) = how;
+        let (periodic, cycles) = how;
         let (moments, deposits, factor) = detached(py, |interrupt| {
-            let cells = Cells { extinction: &extinction, size, cell, sun, periodic, sweeps };
+            let cells = Cells { extinction: &extinction, size, cell, sun, periodic, cycles };
             lock(&self.core).solve_light(&cells, &params, interrupt)
         })?;
         Ok((array(py, moments, &[z, y, x, 8])?, array(py, deposits, &[z, y, x, 2])?, factor))

@@ -1,81 +1,10 @@
 // Bakes the light field: on each level of nested cells the extinction, the optical depth toward the sun, and the light
-// that clouds have scattered at least once out of the forward direction. A level is swept along 18 directions of a
-// lattice; each sweep conserves energy in every cell. Levels are solved from the coarsest to the finest; what enters a
-// finer level at its sides is the radiance of the coarser one.
-//
-// Two fields share a sweep: x is the sun's, for an irradiance of 1; y is that of a uniform sky of radiance 1 over black
-// ground.
+// that clouds have scattered at least once out of the forward direction, which passes/light_solver solves for. Levels
+// are solved from the coarsest to the finest; what enters a finer level at its sides is the radiance of the coarser one.
 #import bindings
 #import density
 #import light_field
-
-// Directions: eight corners, up, down, and eight that are tilted out of the rows. Horizontal directions in place of the
-// tilted would never leave a row of scattered clouds: the fluence between them came out three to ten times too large.
-// The quadrature integrates second moments, and the flux of isotropic light through a plane, exactly. The tilt makes
-// the fourth moment of the vertical exact within 4 %.
-const DIRECTIONS = 18u;
-const CORNERS = 8u;
-const STEEP = 10u; // corners, up and down
-const TILT = 0.12; // sine of the tilt
-const TILTED_WEIGHT = 0.0378938; // in units of 4 pi
-const AXIS_WEIGHT = 0.0725136;
-const CORNER_WEIGHT = 0.0689778;
-
-fn is_corner(d: u32) -> bool {
-    return d < CORNERS;
-}
-
-// Steps of a direction from cell to cell.
-fn lattice_step(d: u32) -> vec3i {
-    if is_corner(d) {
-        return vec3i(i32(d & 1u), i32((d >> 1u) & 1u), i32(d >> 2u)) * 2 - 1;
-    }
-    let up = 1 - 2 * i32(d & 1u);
-    if d < STEEP {
-        return vec3i(0, 0, up);
-    }
-    let along = 1 - 2 * i32((d >> 1u) & 1u);
-    return select(vec3i(0, along, up), vec3i(along, 0, up), d < 14u);
-}
-
-// Unit vector of a direction: the same angles in cells of any shape.
-fn lattice_direction(d: u32) -> vec3f {
-    let step = vec3f(lattice_step(d));
-    if is_corner(d) {
-        return step * inverseSqrt(3.0);
-    }
-    return select(step * vec3f(vec2f(sqrt(1.0 - TILT * TILT)), TILT), step, d < STEEP);
-}
-
-fn lattice_weight(d: u32) -> f32 {
-    return 4.0 * PI * select(select(TILTED_WEIGHT, AXIS_WEIGHT, d < STEEP), CORNER_WEIGHT, is_corner(d));
-}
-
-// Whether a direction is followed from row to row, in at most one cell per row; else along a row, from cell to cell.
-fn crosses_rows(d: u32) -> bool {
-    return d < STEEP || level.tilt_crosses > 0u;
-}
-
-// Length of a direction's path through a cell, m.
-fn lattice_length(d: u32) -> f32 {
-    let direction = abs(lattice_direction(d));
-    if crosses_rows(d) {
-        return level.cell.z / direction.z;
-    }
-    return select(level.cell.y / direction.y, level.cell.x / direction.x, direction.x > 0.0);
-}
-
-fn level_size() -> vec3u {
-    return vec3u(level.across, level.along, level.rows);
-}
-
-fn coarser_size() -> vec3u {
-    return vec3u(level.coarser_across, level.coarser_along, level.coarser_rows);
-}
-
-fn cell_index(at: vec3i) -> u32 {
-    return (u32(at.z) * level.along + u32(at.y)) * level.across + u32(at.x);
-}
+#import light_lattice
 
 // Mean density of a cell, from four points: corners of a tetrahedron.
 @compute @workgroup_size(4, 4, 4)
@@ -106,12 +35,6 @@ fn field_density(@builtin(global_invocation_id) id: vec3u) {
         }
     }
     textureStore(volume_out, id, vec4f(sum / 4.0, 0.0, most, 0.0));
-}
-
-// Texture coordinates in a texture of the level alone.
-fn level_texel(cell: vec3f, size: vec3f) -> vec3f {
-    let inside = clamp(cell.z, 0.5, size.z - 0.5);
-    return vec3f(cell.xy, inside) / size;
 }
 
 fn density_of_level(cell: vec3f) -> f32 {
@@ -224,11 +147,6 @@ fn field_beam(@builtin(global_invocation_id) id: vec3u) {
     deposits[id.x] = vec2f(scale * frame.sky.extinction * optics.r, select(0.0, min(beam, 1.0), level.sunlit > 0u));
 }
 
-fn cell_of(index: u32) -> vec3i {
-    let size = level_size();
-    return vec3i(vec3u(index % size.x, index / size.x % size.y, index / (size.x * size.y)));
-}
-
 // Difference of the optical depth across a cell along an axis: the larger of those to its neighbours, as of a cell at
 // the surface of a cloud one of them lies outside.
 fn depth_across(at: vec3i, axis: vec3i) -> f32 {
@@ -264,17 +182,17 @@ fn lost_at(at: vec3i, depth: f32, extinction: f32) -> f32 {
     return lost.x + lost.y + lost.z;
 }
 
-var<workgroup> partial: array<vec3f, 256>;
+var<workgroup> partial: array<vec2f, 256>;
 
 // Ratio of the light that the sun loses in the level, by its transmittance at the faces, to what the cells take from
-// it. Mean scaled sunlight on what scatters it, and its ratio to that when the level was last solved.
+// it.
 @compute @workgroup_size(256)
 fn field_balance(@builtin(local_invocation_id) id: vec3u) {
     let size = level_size();
     let count = size.x * size.y * size.z;
     let volume = level.cell.x * level.cell.y * level.cell.z;
     let scale = frame.sky.split.z;
-    var sum = vec3f(0.0);
+    var sum = vec2f(0.0);
     let rounds = (count + 255u) / 256u;
     // The same number of iterations for all threads.
     for (var round = 0u; round < rounds; round++) {
@@ -283,122 +201,17 @@ fn field_balance(@builtin(local_invocation_id) id: vec3u) {
         let deposit = deposits[index];
         let at = cell_of(index);
         let lost = lost_at(at, scale * textureLoad(level_optics, at, 0).g, deposit.x);
-        sum += select(vec3f(0.0), vec3f(deposit.x * deposit.y * volume, lost, deposit.x * volume), i < count);
+        sum += select(vec2f(0.0), vec2f(deposit.x * deposit.y * volume, lost), i < count);
     }
     partial[id.x] = sum;
     workgroupBarrier();
     if id.x == 0u {
-        var whole = vec3f(0.0);
+        var whole = vec2f(0.0);
         for (var i = 0u; i < 256u; i++) {
             whole += partial[i];
         }
-        let factor = clamp(whole.y / max(whole.x, 1e-20), 0.25, 4.0);
-        let mean = factor * whole.x / max(whole.z, 1e-20);
-        let before = balance[0].y;
-        balance[0] = vec4f(factor, mean, select(1.0, mean / before, before > 0.0), 0.0);
+        balance[0] = clamp(whole.y / max(whole.x, 1e-20), 0.25, 4.0);
     }
-}
-
-// Moments of the light in a cell: fluence and flux of the sun's field and of the sky's.
-struct Moments {
-    sun: vec4f,
-    sky: vec4f,
-}
-
-// Source functions, linear in the direction: S(d) = S.x + S.yzw . d
-fn write_sources(index: u32, moments: Moments) {
-    let c = frame.sky.split.w; // scaled albedo / 4 pi
-    let turn = vec4f(1.0, vec3f(3.0 * frame.sky.turned_cosine));
-    let beam = deposits[index].y * balance[0].x;
-    let of_sun = c * turn * (moments.sun + vec4f(beam, -beam * level.sun));
-    let of_sky = c * turn * moments.sky;
-    let halves = vec4u(packed(of_sun.xy), packed(of_sun.zw), packed(of_sky.xy), packed(of_sky.zw));
-    if ALONE {
-        few_sources[index] = halves;
-    } else {
-        textureStore(sources_out, cell_of(index), halves);
-    }
-}
-
-// Nearest values that half floats hold. lavapipe rounds toward zero when it stores them: the loss of 2e-4 per
-// scattering is absorption, which takes 2 % of the light from a slab of optical depth 80.
-fn nearest_half(v: vec4f) -> vec4f {
-    return bitcast<vec4f>((bitcast<vec4u>(v) + 0x1000u) & vec4u(0xffffe000u));
-}
-
-fn packed(radiance: vec2f) -> u32 {
-    return pack2x16float(nearest_half(vec4f(radiance, 0.0, 0.0)).xy);
-}
-
-// Moments to begin with: those of the coarser level, or none, or the level's own of before. These change with the mean
-// sunlight on what scatters it: deep decks have slow modes, which the few sweeps of a moving sun do not reach.
-@compute @workgroup_size(64)
-fn field_start(@builtin(global_invocation_id) id: vec3u) {
-    let size = level_size();
-    if id.x >= size.x * size.y * size.z {
-        return;
-    }
-    var moments = Moments(vec4f(0.0), vec4f(0.0));
-    if level.coarser_rows > 0u {
-        moments = coarser_moments(cell_of(id.x));
-    }
-    if level.continues > 0u {
-        moments.sun *= balance[0].z;
-    }
-    moments_now[2u * id.x] = moments.sun;
-    moments_now[2u * id.x + 1u] = moments.sky;
-    moments_before[2u * id.x] = moments.sun;
-    moments_before[2u * id.x + 1u] = moments.sky;
-    write_sources(id.x, moments);
-}
-
-fn coarser_moments(at: vec3i) -> Moments {
-    let uvw = level_texel(coarser_cell(vec3f(at) + 0.5), vec3f(coarser_size()));
-    return Moments(
-        textureSampleLevel(coarser_sun, clamp_sampler, uvw, 0.0),
-        textureSampleLevel(coarser_sky, clamp_sampler, uvw, 0.0),
-    );
-}
-
-// Trilinear interpolation between middles of cells, clamped at the faces.
-struct Corner {
-    low: vec3i,
-    high: vec3i,
-    share: vec3f,
-}
-
-fn interpolation(cell: vec3f, size: vec3u) -> Corner {
-    let at = clamp(cell - 0.5, vec3f(0.0), vec3f(size) - 1.0);
-    let low = vec3i(floor(at));
-    return Corner(low, min(low + 1, vec3i(size) - 1), at - vec3f(low));
-}
-
-fn corner_weight(corner: Corner, i: u32) -> f32 {
-    let w = select(1.0 - corner.share, corner.share, vec3<bool>((i & 1u) > 0u, (i & 2u) > 0u, (i & 4u) > 0u));
-    return w.x * w.y * w.z;
-}
-
-fn corner_index(corner: Corner, i: u32, size: vec2u) -> u32 {
-    let at = select(corner.low, corner.high, vec3<bool>((i & 1u) > 0u, (i & 2u) > 0u, (i & 4u) > 0u));
-    return (u32(at.z) * size.y + u32(at.y)) * size.x + u32(at.x);
-}
-
-// Cells of a side's rim that a direction enters, by direction: those at a side in x, then those at a side in y.
-fn rim_cells() -> u32 {
-    return (level.across + level.along) * level.rows;
-}
-
-fn rim_x(d: u32, at: vec3i) -> u32 {
-    return d * rim_cells() + u32(at.z) * level.along + u32(at.y);
-}
-
-fn rim_y(d: u32, at: vec3i) -> u32 {
-    return d * rim_cells() + level.rows * level.along + u32(at.z) * level.across + u32(at.x);
-}
-
-// Radiance that enters at the top, at the base, or at the sides of an open level: that of the sky from above.
-fn open_radiance(d: u32) -> vec2f {
-    return vec2f(0.0, select(0.0, 1.0, lattice_step(d).z < 0));
 }
 
 // Radiance that enters at the sides: of the coarser level, whose `radiances` they are, half a path through a cell
@@ -424,252 +237,15 @@ fn field_entering(@builtin(global_invocation_id) id: vec3u) {
         let before = vec3f(at) + 0.5 - 0.5 * lattice_length(d) * lattice_direction(d) / level.cell;
         let there = coarser_size();
         let corner = interpolation(coarser_cell(before), there);
+        let path = length_through(d, level.cell / level.coarser_scale, d < STEEP || level.coarser_tilt_crosses > 0u);
         radiance = vec2f(0.0);
         for (var i = 0u; i < 8u; i++) {
-            let cells = there.x * there.y * there.z;
-            let other = radiances[d * cells + corner_index(corner, i, there.xy)];
-            radiance += corner_weight(corner, i) * unpack2x16float(other);
+            let index = corner_index(corner, i, there.xy);
+            let other = mean_radiance(d, index, there.x * there.y * there.z, path * deposits[index].x);
+            radiance += corner_weight(corner, i) * other;
         }
     }
     entering[d * rim_cells() + id.x] = packed(radiance);
-}
-
-// Source functions of a cell in a direction.
-fn source_toward(at: vec3i, direction: vec3f) -> vec2f {
-    var halves: vec4u;
-    if ALONE {
-        halves = few_sources[cell_index(at)];
-    } else {
-        halves = textureLoad(sources, at, 0);
-    }
-    let sun = vec4f(unpack2x16float(halves.x), unpack2x16float(halves.y));
-    let sky = vec4f(unpack2x16float(halves.z), unpack2x16float(halves.w));
-    return vec2f(sun.x + dot(sun.yzw, direction), sky.x + dot(sky.yzw, direction));
-}
-
-// Scaled optical depth of a path of unit length through a cell, 1/m.
-fn scaled_extinction(at: vec3i) -> f32 {
-    return frame.sky.split.z * frame.sky.extinction * textureLoad(level_optics, at, 0).r;
-}
-
-// Radiance that leaves a cell, and its mean along the path through it. The source is linear along the path, with the
-// slope between the neighbours; the mean follows from the balance of the cell, so that energy is conserved for any
-// optical depth. No limiter on the slope: the solve is linear.
-struct Crossing {
-    leaving: vec2f,
-    mean: vec2f,
-}
-
-fn cross_cell(t: f32, entering: vec2f, source: vec2f, slope: vec2f) -> Crossing {
-    let thin = t < 0.02;
-    let e = exp(-t);
-    let a = select((1.0 - e) / max(t, 1e-6), 1.0 - 0.5 * t + t * t / 6.0, thin);
-    let q = select((0.5 * (1.0 + e) - a) / max(t, 1e-6), t / 12.0, thin);
-    let absorbed = a * t; // 1 - exp(-t)
-    return Crossing(
-        entering * (1.0 - absorbed) + source * absorbed + slope * (q * t),
-        entering * a + source * (1.0 - a) - slope * q,
-    );
-}
-
-// Slope of the source along a line, one-sided at its ends.
-fn source_slope(before: vec2f, here: vec2f, next: vec2f, has_before: bool, has_next: bool) -> vec2f {
-    let both = 0.5 * (next - before);
-    return select(select(vec2f(0.0), next - here, has_next), select(here - before, both, has_next), has_before);
-}
-
-// Sweeps the directions that cross rows: a thread follows a line from row to row, in a staircase along the direction.
-// Every cell lies on one line.
-@compute @workgroup_size(32, 2, 1)
-fn field_sweep_down(@builtin(global_invocation_id) id: vec3u) {
-    if all(id < vec3u(level.across, level.along, select(STEEP, DIRECTIONS, level.tilt_crosses > 0u))) {
-        follow_down(id.z, vec2i(id.xy));
-    }
-}
-
-// Rows at which staircases down and up begin: about the top of a deck, and below its base. Were they the same row,
-// lines up and down would go through the same cells, and columns exchange less light: after the planned sweeps a wide
-// level is twice as far from convergence.
-const DOWN_FROM = 20.0;
-const UP_FROM = -1.0;
-
-// Follows a direction from row to row, from a cell at the top or at the base.
-fn follow_down(d: u32, begin: vec2i) {
-    let size = vec3i(level_size());
-    let step = lattice_step(d);
-    let direction = lattice_direction(d);
-    let length = lattice_length(d);
-    let first = d * u32(size.x * size.y * size.z);
-    let open = level.sides != SIDES_PERIODIC;
-    // Cells by which the line moves per row.
-    let shift = abs(direction.xy) / abs(direction.z) * level.cell.z / level.cell.xy;
-    var radiance = open_radiance(d);
-    var at = vec3i(begin, select(size.z - 1, 0, step.z > 0));
-    // The staircase is that of the row's number, whichever row it begins in.
-    let first_step = select(DOWN_FROM - (level.lowest + f32(size.z) - 1.0), level.lowest - UP_FROM, step.z > 0);
-    var before = vec2f(0.0);
-    var here = source_toward(at, direction);
-    var has_before = false;
-    var m = 1;
-    var moved = vec2f(floor(shift * first_step + 0.5));
-    loop {
-        let move_to = floor(shift * (first_step + f32(m)) + 0.5);
-        let last = m >= size.z;
-        var next_at = vec3i(at.xy + step.xy * vec2i(move_to - moved), select(at.z + step.z, at.z, last));
-        moved = move_to;
-        let under = next_at.xy < vec2i(0);
-        let over = next_at.xy >= size.xy;
-        next_at = vec3i(next_at.xy + select(vec2i(0), size.xy, under) - select(vec2i(0), size.xy, over), next_at.z);
-        let wraps = open && any(under | over);
-        let next = source_toward(next_at, direction);
-        let slope = source_slope(before, here, next, has_before, !(last || wraps));
-        let crossing = cross_cell(scaled_extinction(at) * length, radiance, here, slope);
-        radiances[first + cell_index(at)] = packed(crossing.mean);
-        radiance = crossing.leaving;
-        if open {
-            let in_x = under.x || over.x;
-            let from_side = unpack2x16float(entering[select(rim_y(d, next_at), rim_x(d, next_at), in_x)]);
-            radiance = select(radiance, from_side, wraps);
-        }
-        before = here;
-        has_before = !wraps;
-        here = next;
-        at = next_at;
-        m += 1;
-        if last {
-            break;
-        }
-    }
-}
-
-// Sweeps the tilted directions in cells that are not flat: a thread follows a line from cell to cell, which changes its
-// row from time to time, and begins anew where it has left the level at the top or at the base. In a periodic level it
-// has gone around before, until it has begun anew.
-@compute @workgroup_size(32, 2, 1)
-fn field_sweep_along(@builtin(global_invocation_id) id: vec3u) {
-    let size = vec3i(level_size());
-    let d = STEEP + id.z;
-    let step = lattice_step(d);
-    let in_x = step.x != 0;
-    if id.z >= DIRECTIONS - STEEP || i32(id.x) >= select(size.x, size.y, in_x) || i32(id.y) >= size.z {
-        return;
-    }
-    let count = select(size.y, size.x, in_x);
-    let direction = lattice_direction(d);
-    let length = lattice_length(d);
-    let first = d * u32(size.x * size.y * size.z);
-    let periodic = level.sides == SIDES_PERIODIC;
-    let ahead = step.x + step.y;
-    // Rows by which the line rises from cell to cell. Around a periodic level it rises by whole rows: what leaves a
-    // cell enters another.
-    var rise = TILT / sqrt(1.0 - TILT * TILT) * select(level.cell.y, level.cell.x, in_x) / level.cell.z;
-    rise = select(rise, max(round(rise * f32(count)), 1.0) / f32(count), periodic);
-    let rounds = select(1, i32(ceil(f32(size.z) / (rise * f32(count)))) + 1, periodic);
-    var m = (1 - rounds) * count;
-    // The line is in row `id.y` where its last round begins.
-    var risen = floor(rise * f32(m) + 0.5);
-    let turns = floor((f32(id.y) + f32(step.z) * risen) / f32(size.z));
-    var row = i32(id.y) + step.z * i32(risen) - i32(turns) * size.z;
-    var place = select(count - 1, 0, ahead > 0);
-    var at = line_cell(id.x, place, row, in_x);
-    var radiance = open_radiance(d);
-    if !periodic {
-        radiance = unpack2x16float(entering[select(rim_y(d, at), rim_x(d, at), in_x)]);
-    }
-    var before = vec2f(0.0);
-    var here = source_toward(at, direction);
-    var has_before = false;
-    loop {
-        m += 1;
-        let rise_to = floor(rise * f32(m) + 0.5);
-        row += step.z * i32(rise_to - risen);
-        risen = rise_to;
-        let leaves = row < 0 || row >= size.z;
-        row = select(row, row - step.z * size.z, leaves);
-        place += ahead;
-        place = select(place, place - ahead * count, place < 0 || place >= count);
-        let last = m >= count;
-        let next_at = line_cell(id.x, place, row, in_x);
-        let next = source_toward(next_at, direction);
-        let slope = source_slope(before, here, next, has_before, !(leaves || last));
-        let crossing = cross_cell(scaled_extinction(at) * length, radiance, here, slope);
-        if m > 0 {
-            radiances[first + cell_index(at)] = packed(crossing.mean);
-        }
-        radiance = select(crossing.leaving, open_radiance(d), leaves);
-        before = here;
-        has_before = !leaves;
-        here = next;
-        at = next_at;
-        if last {
-            break;
-        }
-    }
-}
-
-fn line_cell(line: u32, place: i32, row: i32, in_x: bool) -> vec3i {
-    return select(vec3i(i32(line), place, row), vec3i(place, i32(line), row), in_x);
-}
-
-// Moments of a sweep, and the step of Chebyshev's iteration with them.
-@compute @workgroup_size(64)
-fn field_gather(@builtin(global_invocation_id) id: vec3u) {
-    if id.x < level.across * level.along * level.rows {
-        gather(id.x, level.weight);
-    }
-}
-
-// The buffers of both moments exchange their roles after each step.
-fn gather(index: u32, weight: f32) {
-    let cells = level.across * level.along * level.rows;
-    var swept = Moments(vec4f(0.0), vec4f(0.0));
-    for (var d = 0u; d < DIRECTIONS; d++) {
-        let radiance = lattice_weight(d) * unpack2x16float(radiances[d * cells + index]);
-        let moment = vec4f(1.0, lattice_direction(d));
-        swept.sun += radiance.x * moment;
-        swept.sky += radiance.y * moment;
-    }
-    let now = Moments(moments_now[2u * index], moments_now[2u * index + 1u]);
-    let before = Moments(moments_before[2u * index], moments_before[2u * index + 1u]);
-    let next = Moments(
-        before.sun + weight * (now.sun + level.relaxation * (swept.sun - now.sun) - before.sun),
-        before.sky + weight * (now.sky + level.relaxation * (swept.sky - now.sky) - before.sky),
-    );
-    moments_before[2u * index] = select(next.sun, now.sun, ALONE);
-    moments_before[2u * index + 1u] = select(next.sky, now.sky, ALONE);
-    if ALONE {
-        moments_now[2u * index] = next.sun;
-        moments_now[2u * index + 1u] = next.sky;
-    }
-    write_sources(index, next);
-}
-
-// All sweeps of a grid of few cells, by one workgroup: as dispatches of their own most of their time would be that of
-// launching them.
-@compute @workgroup_size(256)
-fn field_sweep_few(@builtin(local_invocation_id) id: vec3u) {
-    let size = level_size();
-    let lines = size.x * size.y * DIRECTIONS;
-    let cells = size.x * size.y * size.z;
-    let mu = level.relaxation - 1.0;
-    var weight = 1.0;
-    for (var sweep = 0u; sweep < level.sweeps; sweep++) {
-        for (var first = 0u; first < lines; first += 256u) {
-            let line = first + id.x;
-            if line < lines {
-                let column = line % (size.x * size.y);
-                follow_down(line / (size.x * size.y), vec2i(vec2u(column % size.x, column / size.x)));
-            }
-        }
-        storageBarrier();
-        for (var first = 0u; first < cells; first += 256u) {
-            if first + id.x < cells {
-                gather(first + id.x, weight);
-            }
-        }
-        storageBarrier();
-        weight = 1.0 / (1.0 - select(0.25 * weight, 0.5, sweep == 0u) * mu * mu);
-    }
 }
 
 // Stores the solution of a level.
@@ -720,7 +296,6 @@ fn field_ground_bake(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= size.xy) {
         return;
     }
-    let cells = size.x * size.y * size.z;
     var sun = 0.0;
     var sky = 0.0;
     for (var d = 0u; d < DIRECTIONS; d++) {
@@ -732,8 +307,9 @@ fn field_ground_bake(@builtin(global_invocation_id) id: vec3u) {
             let corner = interpolation(vec3f(at, 0.5), size);
             var radiance = vec2f(0.0);
             for (var i = 0u; i < 4u; i++) {
-                let index = d * cells + corner_index(corner, i, size.xy);
-                radiance += corner_weight(corner, i) * unpack2x16float(radiances[index]);
+                let index = corner_index(corner, i, size.xy);
+                let depth = lattice_length(d) * deposits[index].x;
+                radiance += corner_weight(corner, i) * mean_radiance(d, index, cell_count(), depth);
             }
             sun -= lattice_weight(d) * direction.z * radiance.x;
             sky -= lattice_weight(d) * direction.z * radiance.y;

@@ -5,6 +5,7 @@ pub mod high_clouds;
 pub mod large_scale_weather;
 pub mod light_field;
 pub mod light_shafts;
+pub mod light_solver;
 pub mod lut;
 pub mod majorant;
 pub mod multiscatter;

@@ -167,10 +167,10 @@ impl Stage {
     /// Grid of wider cells over the same box, if there is one: of cells that are twice as wide along all short sides.
     /// The last cells may reach beyond the box.
     fn coarser(&self) -> Option<Self> {
-        let shortest = self.cell.into_iter().fold(f32::INFINITY, f32::min);
-        let halved: [bool; 3] = std::array::from_fn(|axis| self.cell[axis] < OBLONG * shortest && self.cells[axis] > 2);
-        let cells =
-            std::array::from_fn(|axis| if halved[axis] { self.cells[axis].div_ceil(2) } else { self.cells[axis] });
+        let divisible = |axis: &usize| self.cells[*axis] > 2;
+        let shortest = (0..3).filter(divisible).map(|axis| self.cell[axis]).fold(f32::INFINITY, f32::min);
+        let halved: [bool; 3] = std::array::from_fn(|axis| divisible(&axis) && self.cell[axis] < OBLONG * shortest);
+        let cells: [u32; 3] = std::array::from_fn(|axis| self.cells[axis].div_ceil(1 + u32::from(halved[axis])));
         let cell = std::array::from_fn(|axis| if halved[axis] { 2.0 * self.cell[axis] } else { self.cell[axis] });
         halved.contains(&true).then(|| Self { cells, cell, ..self.clone() })
     }

@@ -94,7 +94,7 @@ override LIGHT_CHEAP: bool = true; // light samples without detail noise
 @group(0) @binding(102) var coarser_sky: texture_3d<f32>;
 // Fluence and flux: of the sun's light, then of the sky's.
 @group(0) @binding(88) var<storage, read_write> moments_now: array<vec4f>;
-// A grid that corrects them (passes/light_field): what it has to correct, and the same and the correction of the coarser.
+// A grid that corrects them (passes/light_solver): what it has to correct; the same and the correction of the coarser.
 @group(0) @binding(89) var<storage, read_write> residuals: array<vec4f>;
 @group(0) @binding(104) var<storage, read_write> coarser_residuals: array<vec4f>;
 @group(0) @binding(105) var<storage, read_write> coarser_correction: array<vec4f>;

@@ -1,6 +1,6 @@
 // Bakes the light field: on each level of nested cells the extinction, the optical depth toward the sun, and the light
-// that clouds have scattered at least once out of the forward direction, which passes/light_solver solves for. Levels
-// are solved from the coarsest to the finest; what enters a finer level at its sides is the radiance of the coarser one.
+// that clouds have scattered at least once out of the forward direction (passes/light_solver). Levels are solved from
+// the coarsest to the finest; what enters a finer level at its sides is the radiance of the coarser one.
 #import bindings
 #import density
 #import light_field

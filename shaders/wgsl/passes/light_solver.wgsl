@@ -1,6 +1,6 @@
-// Solves a level of the light field by cycles of multigrid: sweeps of its cells along the directions of the lattice, and
-// grids of wider cells that correct what such sweeps would need hundreds of rounds for (luts/light_solver.rs). Each sweep
-// conserves energy in every cell.
+// Solves a level of the light field by cycles of multigrid: sweeps of its cells along the directions of the lattice,
+// and grids of wider cells that correct what such sweeps would need hundreds of rounds for (luts/light_solver.rs). Each
+// sweep conserves energy in every cell.
 #import bindings
 #import light_lattice
 

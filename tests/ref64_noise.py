@@ -395,7 +395,8 @@ def weather_from_map(texel, clouds):
     rain = rain * f32(clouds.precipitation)
     kind = np.clip(kind + 2 * (f32(clouds.type) - 0.5), 0, 1)
     coverage = np.clip(coverage + 2 * (f32(clouds.coverage) - 0.5), 0, 1)
-    coverage = np.maximum(coverage, 0.95 * rain * min(5 * f32(clouds.coverage), 1))
+    wet = np.clip((1.25 if clouds.field == "heaped" else 0.95) * rain, 0, 1)
+    coverage = np.maximum(coverage, wet * min(5 * f32(clouds.coverage), 1))
     return coverage, kind + rain * (1 - kind), rain
 
 
@@ -405,6 +406,13 @@ def gradients(clouds):
 
 def between(height, a, b, c, d):
     return np.clip(ref64.remap(height, a, b), 0, 1) * (1 - smoothstep(c, d, height))
+
+
+def profile_of(height, edges, clouds):
+    """Rise and fall; of the field `heaped` the fall alone."""
+    if clouds.field == "heaped":
+        return 1 - smoothstep(edges[2], edges[3], height)
+    return between(height, *edges)
 
 
 def height_profile(height, kind, clouds, tower=0.0):
@@ -422,10 +430,11 @@ def height_profile(height, kind, clouds, tower=0.0):
             return half(clouds.profile[t[..., 1], t[..., 0]])[..., None]
 
         dry = sample(texels, (columns, rows), at)[:, 0]
-        return dry + tower * (between(height, *storm) - dry)
+        return dry + tower * (profile_of(height, storm, clouds) - dry)
     weights = np.stack([1 - 2 * kind, 1 - np.abs(2 * kind - 1), 2 * kind - 1]).clip(0)
     edges = np.tensordot(np.transpose(gradients(clouds)), weights, 1)
-    return between(height, *(edges + tower * (storm.reshape(4, *[1] * edges[0].ndim) - edges)))
+    edges = edges + tower * (storm.reshape(4, *[1] * edges[0].ndim) - edges)
+    return profile_of(height, edges, clouds)
 
 
 def base_shape(noise):
@@ -445,8 +454,39 @@ def eroded(shape, detail, height, depth):
     return np.where(shape > 0, np.clip(ref64.remap(shape, modifier * depth, 1), 0, 1), 0)
 
 
+def billows(p, period, salt):
+    return 1 - np.clip(1.25 * (1 - worley(p, period, salt)) ** 2, 0, 1)
+
+
+def heaped_texels(texels, clouds):
+    """Base noise of the field `heaped`."""
+    p = (texels + 0.5) / SHAPE_SIZE
+    seed = clouds.seed * 131
+    heaps = sum(
+        w * billows(p, 3 << i, (seed + 31 + i) % 2**32)
+        for i, w in enumerate((0.45, 0.28, 0.17, 0.1))
+    )
+    noise = (perlin_fbm(p, 3, 3, (seed + 1) % 2**32) + heaps) / 2
+    return np.clip(0.42 + 1.9 * (noise - 0.563), 0, 1)[..., None]
+
+
+def relief_texels(texels, clouds):
+    """Relief of the field `heaped`."""
+    p = (texels + 0.5) / FINER_SIZE
+    seed = clouds.seed * 131 + 61
+    weights = 0.5, 0.27, 0.14, 0.09, 0.06
+    relief = sum(w * billows(p, 3 << i, (seed + i) % 2**32) for i, w in enumerate(weights))
+    return np.clip(0.5 + 1.6 * (relief - 0.6 - 0.6 * weights[-1]), 0, 1)[..., None]
+
+
 def bakes(params):
     """What is in each texture."""
+    if params.clouds.field == "heaped":
+        return {
+            **bakes(params.with_(**{"clouds.field": "eroded"})),
+            "shape_noise": lambda texels: heaped_texels(texels, params.clouds),
+            "detail_noise": lambda texels: relief_texels(texels, params.clouds),
+        }
     return {
         "weather_map": lambda texels: weather_texels(texels, params.weather),
         "broad_map": lambda texels: broad_texels(texels, params.weather),
@@ -584,7 +624,20 @@ class Field:
         profile = np.where(
             (height > 0) & (height < 1), height_profile(height, kind, clouds, tower), 0
         )
-        if clouds.precipitation > 0:
+        whole = top + tower * (tallest - top) - base
+        heap = Heap(clouds, altitude - base, kind, rain, tower, coverage, whole)
+        if clouds.precipitation > 0 and clouds.field == "heaped":
+            edge = 0.6 - 0.5 * f32(clouds.anvil)
+            spread = smoothstep(edge, edge + 0.4, rain)
+            under = 0.86 - 0.14 * spread**2
+            up = (altitude - base) / (tallest - base)
+            anvil = spread * smoothstep(under, under + 0.08, up) * (1 - smoothstep(0.9, 0.98, up))
+            anvil = anvil * np.clip(4 * coverage, 0, 1)
+            outweighs = 2 * anvil > profile + coverage
+            profile, coverage = (np.where(outweighs, anvil, v) for v in (profile, coverage))
+            heap.growth = np.where(outweighs, 0, heap.growth)
+            height = np.minimum(height, 1)
+        elif clouds.precipitation > 0:
             edge = 0.6 - 0.5 * f32(clouds.anvil)
             anvil = smoothstep(edge, edge + 0.3, rain) * np.clip(4 * coverage, 0, 1)
             anvil = anvil * between((altitude - base) / (tallest - base), 0.64, 0.8, 0.88, 1)
@@ -592,8 +645,8 @@ class Field:
             height = np.minimum(height, 1)
         wind = self.params.wind
         winds = (wind.direction, wind.speed), (wind.detail_direction, wind.detail_speed)
-        density = self.cloud(upright, altitude, height, profile, coverage, winds, 1.0)
-        return with_coverage(profile, coverage), density
+        density = self.cloud(upright, altitude, height, profile, coverage, winds, 1.0, heap)
+        return limit_of(profile, coverage, clouds), density
 
     def upper(self, points, altitude):
         """The deck above: scaled, in a wind of its own, from another part of the map."""
@@ -614,8 +667,11 @@ class Field:
         )
         faster = f32(f32(deck.speed) + f32(wind.detail_speed) - f32(wind.speed))
         winds = (deck.direction, deck.speed), (deck.direction, faster)
-        density = self.cloud(upright, altitude, height, profile, coverage, winds, scale)
-        return with_coverage(profile, coverage), density
+        whole = f32(deck.top) - base
+        clouds = self.params.clouds
+        heap = Heap(clouds, (altitude - base) / scale, kind, 0 * kind, 0.0, coverage, whole, scale)
+        density = self.cloud(upright, altitude, height, profile, coverage, winds, scale, heap)
+        return limit_of(profile, coverage, clouds), density
 
     def rain(self, points, altitude):
         """Streaks, twelve times longer than wide, that thin out on their way down; what is thinner
@@ -638,17 +694,82 @@ class Field:
         rise = self.time * f32(self.params.wind.updraft)
         return np.column_stack([at / scale, altitude / scale - rise / scale])
 
-    def cloud(self, upright, altitude, height, profile, coverage, winds, scale):
+    def cloud(self, upright, altitude, height, profile, coverage, winds, scale, heap):
         clouds = self.params.clouds
-        at = self.carried(upright, altitude, winds[0], scale) / f32(clouds.shape_scale)
+        heaped = clouds.field == "heaped"
+        place = self.carried(upright, altitude, winds[0], scale)
+        if heaped:
+            place[:, 2] += heap.upright() - heap.over_base
+        at = place / f32(clouds.shape_scale)
         noise = sample(self.textures["shape_noise"], SHAPE_SIZE, at)[:, 0]
         shape = with_coverage(noise * profile, coverage)
-        shape = np.where(with_coverage(profile, coverage) > 0, shape, 0)
+        if heaped:
+            shape = heap.shape(noise, profile, coverage)
+        shape = np.where(limit_of(profile, coverage, clouds) > 0, shape, 0)
 
         moved = self.carried(upright, altitude, winds[1], scale)
         at = moved[:, :2] / f32(clouds.curl_scale)
         swirl = sample(self.textures["curl_noise"], CURL_SIZE, at)[:, :2]
-        moved[:, :2] += f32(clouds.curl) * (1 - height[:, None]) * swirl
+        curled = 1 - heap.vigour(coverage) if heaped else 1 - height
+        moved[:, :2] += f32(clouds.curl) * curled[:, None] * swirl
         at = moved / f32(clouds.detail_scale)
         detail = sample(self.textures["detail_noise"], FINER_SIZE, at)[:, 0]
+        if heaped:
+            return heap.density(shape, detail, swirl[:, 0], coverage)
         return eroded(shape, detail, height, f32(clouds.detail))
+
+
+def limit_of(profile, coverage, clouds):
+    if clouds.field == "heaped":
+        return np.clip(profile - 1.2 * (1 - coverage), 0, 1)
+    return with_coverage(profile, coverage)
+
+
+def mix(a, b, t):
+    return a + t * (b - a)
+
+
+class Heap:
+    """What the field `heaped` has besides weather and noises (docs/clouds.md), in the coordinates
+    of the noises.
+    """
+
+    def __init__(self, clouds, over_base, kind, rain, tower, coverage, whole, scale=1.0):
+        self.slope = 4.16 / f32(clouds.shape_scale)
+        self.over_base = over_base
+        self.growth = np.maximum(smoothstep(0.35, 0.85, kind), np.minimum(2 * rain, 1))
+        storm = f32(clouds.cumulonimbus)
+        if clouds.profile is not None:
+            edges = mix(np.array([0.0, 0, 1, 1])[:, None], storm[:, None], tower + 0 * kind)
+        else:
+            weights = np.stack([1 - 2 * kind, 1 - np.abs(2 * kind - 1), 2 * kind - 1]).clip(0)
+            dry = np.tensordot(np.transpose(gradients(clouds)), weights, 1)
+            edges = mix(dry, storm[:, None], tower)
+        top = mix(edges[2], edges[3], coverage)
+        self.depth = np.maximum(top - edges[0], 1e-3) * whole / scale
+        self.relief = np.minimum(0.5 * f32(clouds.detail), 0.6 * self.slope * self.depth)
+
+    def upright(self):
+        h = np.maximum(self.over_base, 0)
+        return np.where(h < 600, h**2 / 1200, h - 300)
+
+    def shape(self, noise, profile, coverage):
+        s = noise + profile - 1 - 1.2 * (1 - coverage)
+        lift = mix(0.9 * self.depth, 350, self.growth) * (mix(0.55, 0.72, self.growth) - noise)
+        s = np.minimum(s, self.slope * (self.over_base - lift))
+        return np.maximum(s - 0.1 * self.relief, 0)
+
+    def vigour(self, coverage):
+        risen = np.clip(self.over_base / 250, 0, 1)
+        return smoothstep(0.15, 0.5, coverage) * self.growth * risen
+
+    def density(self, shape, detail, swirl, coverage):
+        v = self.vigour(coverage)
+        modifier = mix(detail, 1 - detail, smoothstep(0.1, 0.5, v))
+        here = self.relief * mix(0.6, 1.4, np.clip(0.5 + 0.5 * swirl, 0, 1))
+        edge = np.minimum(mix(0.03, 0.008, v), np.maximum(0.3 * self.relief, 0.008))
+        core = np.clip(shape / np.minimum(0.4, 0.667 * self.slope * self.depth), 0, 1)
+        risen = np.clip(self.over_base / mix(300, 700, self.growth), 0, 1)
+        water = mix(core, 1, self.growth) * mix(0.25, 1, risen)
+        left = np.clip((shape - here * (modifier - 0.1)) / edge, 0, 1)
+        return np.where(shape > 0, water * left, 0)

@@ -78,10 +78,19 @@ def test_methods_converge_to_the_reference(renderer, model):
 
 
 @pytest.mark.slow_after(1)
-@pytest.mark.parametrize(("scene", "clear"), [("fair_weather", 0.1), ("storm", 0.005)])
-def test_majorants_are_never_exceeded(rng, scene, clear):
+@pytest.mark.parametrize(
+    ("scene", "field", "clear"),
+    [
+        ("fair_weather", "eroded", 0.1),
+        ("storm", "eroded", 0.005),
+        ("fair_weather", "heaped", 0.1),
+        ("storm", "heaped", 0.005),
+    ],
+)
+def test_majorants_are_never_exceeded(rng, scene, field, clear):
     """Not at the point, and nowhere within their reach."""
-    params = nubis.scenes[scene][1].with_(**{"light.model": "path"})
+    changes = {"light.model": "path", "clouds.field": field}
+    params = nubis.scenes[scene][1].with_(**changes)
     clouds = params.clouds
     top = clouds.cumulonimbus_top if clouds.precipitation > 0 else clouds.top
     low, high = [-20_000, -20_000, clouds.base], [20_000, 20_000, top]
@@ -93,7 +102,10 @@ def test_majorants_are_never_exceeded(rng, scene, clear):
     near = "majorant_at(x.xyz, altitude_at(x.xyz))"
     at = "cloud_density_at(x.xyz, altitude_at(x.xyz), 0.0)"
     points = rng.uniform(low, high, (60_000, 3))
-    density = ask(f"vec4f({at}, 0.0, 0.0, 0.0)", points)[:, 0]
+    limit = "cloud_column(x.xyz, altitude_at(x.xyz)).limit"
+    density, limits = ask(f"vec4f({at}, {limit}, 0.0, 0.0)", points)[:, :2].T
+    # Skipped is what has no limit.
+    assert (limits[density > 0] > 0).all()
     # From every cloudy point back to one from where it can be reached.
     points, density = points[density > 0], density[density > 0]
     assert len(points) > 1000

@@ -9,7 +9,7 @@ fn main() {
     let root = root.canonicalize().expect("shaders/wgsl lies two folders above the crate");
     println!("cargo::rerun-if-changed={}", root.display());
     let mut files: Vec<PathBuf> = Vec::new();
-    for folder in [root.clone(), root.join("passes"), root.join("light_models")] {
+    for folder in [root.clone(), root.join("passes"), root.join("light_models"), root.join("fields")] {
         println!("cargo::rerun-if-changed={}", folder.display());
         for entry in fs::read_dir(folder).expect("the shaders can be listed") {
             files.push(entry.expect("the shaders can be listed").path());

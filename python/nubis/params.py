@@ -108,10 +108,16 @@ class Clouds(Block):
         Extinction at density 1. Allowed: a number from 0 to 100000000 1/m.
     seed : int
         Random seed of the noises. Allowed: a whole number from 0 to 4294967295.
+    field : {eroded, heaped}
+        Field of cloud density. `eroded`: Perlin-Worley noise times the height profile, eroded by
+        detail (nubis2015). `heaped`: a shape that behaves like a distance, with lifted bases,
+        relief of billows and narrow edges; `extinction` is that of a core, 0.05 to 0.1. Allowed:
+        one of "eroded", "heaped".
     noise : {nubis2015, vsu2022}
-        Noises of base shape and detail. `nubis2015`: Perlin-Worley noise and three octaves of
-        Worley FBM for the base shape, Worley FBM for the detail. `vsu2022`: Perlin-Worley noise of
-        rising frequency in every channel. Allowed: one of "nubis2015", "vsu2022".
+        Noises of base shape and detail of the field `eroded`. `nubis2015`: Perlin-Worley noise and
+        three octaves of Worley FBM for the base shape, Worley FBM for the detail. `vsu2022`:
+        Perlin-Worley noise of rising frequency in every channel. Allowed: one of "nubis2015",
+        "vsu2022".
     shape_scale : float
         Tile width of the base-shape noise. Allowed: a number from 100 to 200000 m.
     detail_scale : float
@@ -158,6 +164,7 @@ class Clouds(Block):
     rain_extinction: float = 0.0
     extinction: float = 0.2
     seed: int = 1
+    field: Literal["eroded", "heaped"] = "eroded"
     noise: Literal["nubis2015", "vsu2022"] = "nubis2015"
     shape_scale: float = 5200.0
     detail_scale: float = 420.0

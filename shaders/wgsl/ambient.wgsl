@@ -12,9 +12,6 @@ const DIFFUSED = 0.15;
 // Optical depth, after that scaling, of the boundary layer in which light comes as much from outside as from inside the
 // cloud. Its value gives thick clouds the two-stream transmittance of 1 / (3/4 depth).
 const SKIN = 1.333;
-// Mean density of a cloud at coverage 1, as a fraction of the largest: the product of noise, profile and detail.
-// Measured along verticals of optical depth over 1: 0.15 in the scene `overcast`, 0.12 in `stratocumulus` and `storm`.
-const FILLING = 0.12;
 
 // Fraction of the clear sky's irradiance on the ground under partial cloud cover: 1 beside the clouds, their two-stream
 // transmittance under them.
@@ -22,7 +19,7 @@ fn ground_share() -> f32 {
     if VOLUME {
         return 1.0;
     }
-    let thick = DIFFUSED * FILLING * params.clouds.extinction * (params.clouds.top - params.clouds.base);
+    let thick = DIFFUSED * filling_of(0.5) * params.clouds.extinction * (params.clouds.top - params.clouds.base);
     return 1.0 - params.light.ambient_occlusion * cloud_cover() * (1.0 - 1.0 / (1.0 + 0.75 * thick));
 }
 
@@ -38,7 +35,7 @@ fn clouded_sky(sky: vec3f) -> vec3f {
 
 // Fraction of the ambient light at a point that comes from above; the rest comes from below.
 fn ambient_share(column: WeatherSample) -> f32 {
-    let thick = DIFFUSED * FILLING * column.coverage * frame.sky.extinction * column.thickness;
+    let thick = DIFFUSED * filling_of(column.growth) * column.coverage * frame.sky.extinction * column.thickness;
     let two_streams = (SKIN + column.depth_share * thick) / (2.0 * SKIN + thick);
     return mix(saturate(column.height), two_streams, params.light.ambient_occlusion);
 }

@@ -1,9 +1,10 @@
-// Cloud density: weather, height profile, base shape and detail (nubis2015, "density sampler"; thesis2018, "six
-// steps"), or the user's grid.
+// Cloud density: weather and height profile (nubis2015, "density sampler"; thesis2018, "six steps"), and the base shape
+// and detail of the field, or the user's grid. `cloud_field` stands for the file of the field in fields/.
 #import math
 #import bindings
 #import volume
 #import chart
+#import cloud_field
 
 // Density evaluations of this invocation.
 var<private> evaluations: u32 = 0u;
@@ -32,6 +33,8 @@ struct WeatherSample {
     medium: u32,
     thickness: f32, // of the cloud at this place, from base to top, m
     depth_share: f32, // fraction of the thickness below the point
+    over_base: f32, // height above the base of the deck in the coordinates of the noises, m
+    growth: f32, // 0 in layers, 1 in heaps
 }
 
 // Local weather from a texel of the weather map. The parameters offset the map's values (vsu2022: coverage shifts the
@@ -40,9 +43,8 @@ fn weather_from_map(texel: vec3f) -> LocalWeather {
     let rain = texel.b * params.clouds.precipitation;
     let shifted = saturate(texel.r + 2.0 * params.clouds.coverage - 1.0);
     let kind = saturate(texel.g + 2.0 * params.clouds.type_ - 1.0);
-    // Rain raises coverage to at least 0.7 in nubis2015, here to 0.95, as towers have holes otherwise. It also shifts
-    // the type toward cumulonimbus. A clear sky stays clear.
-    let wet = 0.95 * rain * saturate(5.0 * params.clouds.coverage);
+    // Rain raises coverage, and shifts the type toward cumulonimbus. A clear sky stays clear.
+    let wet = saturate(WET * rain) * saturate(5.0 * params.clouds.coverage);
     return LocalWeather(max(shifted, wet), mix(kind, 1.0, rain), rain);
 }
 
@@ -69,10 +71,6 @@ fn profile_edges(kind: f32, rain: f32) -> vec4f {
     return dry;
 }
 
-fn profile_between(height: f32, edges: vec4f) -> f32 {
-    return remap01(height, edges.x, edges.y) * (1.0 - smoothstep(edges.z, max(edges.w, edges.z + 1e-4), height));
-}
-
 // Height profile at a height: from the four fractions, or from the user's table.
 fn height_profile(height: f32, kind: f32, rain: f32) -> f32 {
     if PROFILE_TABLE {
@@ -89,25 +87,14 @@ fn profile_from_table(height: f32, kind: f32) -> f32 {
     return textureSampleLevel(profile_table, clamp_sampler, uv, 0.0).r;
 }
 
-// Base shape after coverage: values above 1 - coverage are stretched to [0, 1] and scaled by coverage, so that sparse
-// clouds are thin.
-fn with_coverage(base: f32, coverage: f32) -> f32 {
-    return remap01(base, 1.0 - coverage, 1.0) * coverage;
-}
-
-// Erosion of the base shape by detail: wispy at the base, billowy above.
-fn eroded(shape: f32, detail: f32, height: f32) -> f32 {
-    let modifier = mix(detail, 1.0 - detail, saturate(10.0 * height));
-    return select(0.0, remap01(shape, modifier * params.clouds.detail, 1.0), shape > 0.0);
-}
-
 // Weather at a point `p` relative to the eye.
 fn cloud_column(p: vec3f, altitude: f32) -> WeatherSample {
     evaluations += 1u;
     if VOLUME {
         let height = saturate((p.z - frame.sky.volume_low.z) / (frame.sky.volume_high.z - frame.sky.volume_low.z));
         let thickness = frame.sky.volume_high.z - frame.sky.volume_low.z;
-        return WeatherSample(select(0.0, 1.0, in_volume(p)), 1.0, 1.0, height, 0.0, p, CLOUD, thickness, height);
+        let inside = select(0.0, 1.0, in_volume(p));
+        return WeatherSample(inside, 1.0, 1.0, height, 0.0, p, CLOUD, thickness, height, 0.0, 0.0);
     }
     return column_on_chart(on_chart(p, altitude), altitude);
 }
@@ -183,16 +170,6 @@ fn tallest() -> f32 {
     return max(params.clouds.top, params.clouds.cumulonimbus_top);
 }
 
-// Height profile of the anvil, in fractions of the height of a cumulonimbus: start and end of its rise, start and end
-// of its fall.
-const ANVIL = vec4f(0.64, 0.80, 0.88, 1.0);
-
-fn anvil(rain: f32, altitude: f32) -> f32 {
-    let height = (altitude - params.clouds.base) / (tallest() - params.clouds.base);
-    let edge = ANVIL_EDGE.x - ANVIL_EDGE.y * params.clouds.anvil;
-    return smoothstep(edge, edge + 0.3, rain) * profile_between(height, ANVIL);
-}
-
 // Lower deck at a chart position and altitude.
 fn cloud_in(weather: LocalWeather, at: vec2f, altitude: f32) -> WeatherSample {
     let rain = weather.precipitation;
@@ -200,16 +177,25 @@ fn cloud_in(weather: LocalWeather, at: vec2f, altitude: f32) -> WeatherSample {
     let height = (altitude - base) / (cloud_top(rain) - base);
     // Bound of the base shape: noise is at most 1, so there is no cloud where the profile alone is below 1 - coverage.
     let inside = height > 0.0 && height < 1.0;
-    var column = WeatherSample(0.0, 0.0, weather.coverage, height, rain, vec3f(at, altitude), CLOUD, 0.0, 0.0);
+    var column = WeatherSample(
+        0.0,
+        0.0,
+        weather.coverage,
+        height,
+        rain,
+        vec3f(at, altitude),
+        CLOUD,
+        0.0,
+        0.0,
+        altitude - base,
+        growth_of(weather.kind, rain),
+    );
     column.profile = select(0.0, height_profile(height, weather.kind, tower(rain)), inside);
     column = with_extent(column, weather.kind, tower(rain), cloud_top(rain) - base);
     if RAINY {
-        let spread = anvil(rain, altitude) * saturate(4.0 * weather.coverage);
-        column.profile = max(column.profile, spread);
-        column.coverage = max(column.coverage, spread);
-        column.height = min(height, 1.0);
+        column = with_anvil(column, anvil(rain, altitude) * saturate(4.0 * weather.coverage));
     }
-    column.limit = with_coverage(column.profile, column.coverage);
+    column.limit = limit_of(column.profile, column.coverage);
     return column;
 }
 
@@ -238,8 +224,11 @@ fn upper_cloud_at(place: vec2f, altitude: f32, broad: vec4f) -> WeatherSample {
     let kind = saturate(texel.g + 2.0 * params.upper_clouds.type_ - 1.0);
     let profile = height_profile(height, kind, 0.0);
     let inside = height > 0.0 && height < 1.0;
-    let limit = select(0.0, with_coverage(profile, coverage), inside);
-    let column = WeatherSample(limit, profile, coverage, height, 0.0, at, UPPER_CLOUD, 0.0, 0.0);
+    let limit = select(0.0, limit_of(profile, coverage), inside);
+    let over_base = (altitude - base) / params.upper_clouds.scale;
+    let growth = growth_of(kind, 0.0);
+    let column =
+        WeatherSample(limit, profile, coverage, height, 0.0, at, UPPER_CLOUD, 0.0, 0.0, over_base, growth);
     return with_extent(column, kind, 0.0, params.upper_clouds.top - base);
 }
 
@@ -251,7 +240,7 @@ fn rain_below(weather: LocalWeather, at: vec2f, altitude: f32) -> WeatherSample 
     let streak = vec3f(at, altitude / RAIN_STRETCH + frame.sky.rain_fall);
     // The whole cloud lies above the rain.
     let thickness = cloud_top(weather.precipitation) - params.clouds.base;
-    return WeatherSample(limit, 1.0, 1.0, 0.0, weather.precipitation, streak, RAIN, thickness, 0.0);
+    return WeatherSample(limit, 1.0, 1.0, 0.0, weather.precipitation, streak, RAIN, thickness, 0.0, 0.0, 0.0);
 }
 
 // Base shape, without detail: cheap to evaluate, and an upper bound of the density.
@@ -271,7 +260,8 @@ fn base_noise(column: WeatherSample) -> f32 {
     }
     let upper = UPPER && column.medium == UPPER_CLOUD;
     let origin = select(frame.sky.shape_origin, frame.sky.upper_shape_origin, upper);
-    return textureSampleLevel(shape_noise, repeat_sampler, origin + column.at / params.clouds.shape_scale, 0.0).r;
+    let at = origin + noise_place(column) / params.clouds.shape_scale;
+    return textureSampleLevel(shape_noise, repeat_sampler, at, 0.0).r;
 }
 
 // Base shape for a value of the base-shape noise.
@@ -279,7 +269,7 @@ fn shape_in(column: WeatherSample, noise: f32) -> f32 {
     if VOLUME {
         return select(0.0, noise, column.limit > 0.0);
     }
-    var shape = with_coverage(noise * column.profile, column.coverage);
+    var shape = shape_of(column, noise);
     if RAIN_SHAFTS && column.medium == RAIN {
         shape = column.limit * remap01(noise, 0.15, 0.65);
     }
@@ -300,10 +290,10 @@ fn cloud_density(column: WeatherSample, shape: f32, width: f32) -> f32 {
     let curl_origin = select(frame.sky.curl_origin, frame.sky.upper_curl_origin, upper);
     let curl_at = curl_origin + column.at.xy / params.clouds.curl_scale;
     let swirl = textureSampleLevel(curl_noise, repeat_sampler, curl_at, 0.0).xy;
-    let moved = column.at + vec3f(params.clouds.curl * (1.0 - column.height) * swirl, 0.0);
+    let moved = column.at + vec3f(params.clouds.curl * curled(column) * swirl, 0.0);
     let at = select(frame.sky.detail_origin, frame.sky.upper_detail_origin, upper) + moved / params.clouds.detail_scale;
     let detail = detail_at(at, scaled(width, upper) / params.clouds.detail_scale);
-    return with_share(column, eroded(shape, detail, column.height), shape);
+    return with_share(column, density_of(column, shape, detail, swirl.x, scaled(width, upper)), shape);
 }
 
 // Detail noise that erodes the edges, at a footprint of `tiles` tiles. The texture is the sum of the detail and its
@@ -329,12 +319,12 @@ fn cloud_density_at(p: vec3f, altitude: f32, width: f32) -> f32 {
     return cloud_density(column, cloud_shape(column), width);
 }
 
-// Density without the read of the detail: erosion by the mean of the detail keeps the mean of light samples.
+// Density without the read of the detail: its mean.
 fn cloud_density_cheap(p: vec3f, altitude: f32) -> f32 {
     let column = cloud_column(p, altitude);
     let shape = cloud_shape(column);
     if VOLUME {
         return shape;
     }
-    return with_share(column, remap01(shape, 0.5 * params.clouds.detail, 1.0), shape);
+    return with_share(column, mean_density_of(column, shape), shape);
 }

@@ -33,6 +33,16 @@ choice! {
 }
 
 choice! {
+    /// Fields of cloud density.
+    Field {
+        /// Published: the base shape, eroded by detail.
+        Eroded = "eroded",
+        /// Heaps and layers with relief and narrow edges.
+        Heaped = "heaped",
+    }
+}
+
+choice! {
     /// Noises of the baked weather map.
     WeatherNoise {
         /// Sum of Worley and Perlin noise.
@@ -161,7 +171,11 @@ params! {
         extinction: f32 = 0.2, in 0..=100000000 "1/m";
         /// Random seed of the noises.
         seed: u32 = 1, in 0..=4294967295.0 "";
-        /// Noises of base shape and detail. `nubis2015`: Perlin-Worley noise and three octaves of Worley FBM for the
+        /// Field of cloud density. `eroded`: Perlin-Worley noise times the height profile, eroded by detail
+        /// (nubis2015). `heaped`: a shape that behaves like a distance, with lifted bases, relief of billows and
+        /// narrow edges; `extinction` is that of a core, 0.05 to 0.1.
+        field: Field = Field::Eroded;
+        /// Noises of base shape and detail of the field `eroded`. `nubis2015`: Perlin-Worley noise and three octaves of Worley FBM for the
         /// base shape, Worley FBM for the detail. `vsu2022`: Perlin-Worley noise of rising frequency in every
         /// channel.
         noise: Noise = Noise::Nubis2015;

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::luts::{large_scale_weather, light_solver, majorant, multiscatter, noise, shadow, sky, weather};
-use crate::params::{self, Model, Params, Quality};
+use crate::params::{self, Field, Model, Params, Quality};
 use crate::schema::{Block, wgsl_struct};
 use crate::uniforms::{Dispatch, FieldLevel, Sky, View};
 use crate::{blue_noise, camera, chart, color, frame, gpu, grid, moon, scattering, scene_depth, specialization};
@@ -39,16 +39,22 @@ pub fn read(name: &str) -> Option<String> {
     gpu::read(name, generated)
 }
 
-/// Links a WGSL file with all of its imports. The file of a light model is linked as that model.
+/// Links a WGSL file with all of its imports. The file of a light model, or of a field, is linked as that.
 pub fn link(name: &str) -> std::result::Result<Linked, String> {
-    let own = names().find(|known| *known == name && known.starts_with("light_models/"));
-    let model = own.map_or(specialization::light_model(Model::Octaves), |file| ("light_model", file));
-    Linked::new(name, &[model], generated)
+    let own = |folder| names().find(|known| *known == name && known.starts_with(folder));
+    let [model, field] = default_imports();
+    let model = own("light_models/").map_or(model, |file| ("light_model", file));
+    let field = own("fields/").map_or(field, |file| ("cloud_field", file));
+    Linked::new(name, &[model, field], generated)
+}
+
+fn default_imports() -> [gpu::Import; 2] {
+    [specialization::light_model(Model::Octaves), specialization::cloud_field(Field::Eroded)]
 }
 
 /// Links WGSL source with all of its imports.
 pub fn link_source(source: &str) -> std::result::Result<Linked, String> {
-    Linked::from_source(source, &[specialization::light_model(Model::Octaves)], generated)
+    Linked::from_source(source, &default_imports(), generated)
 }
 
 /// Source of a generated module.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use crate::frame::Frame;
 use crate::gpu::{Import, Specialization};
-use crate::params::{Model, Params, Quality, WeatherNoise};
+use crate::params::{Field, Model, Params, Quality, WeatherNoise};
 
 /// Table of a picture. `layers`: background radiance and depth are outputs too.
 pub(crate) fn of_picture(params: &Params, quality: &Quality, frame: &Frame, layers: bool) -> Arc<Specialization> {
@@ -53,6 +53,15 @@ pub(crate) fn light_model(model: Model) -> Import {
     ("light_model", file)
 }
 
+/// File of a field of cloud density, by the name that density.wgsl imports.
+pub(crate) fn cloud_field(field: Field) -> Import {
+    let file = match field {
+        Field::Eroded => "fields/eroded",
+        Field::Heaped => "fields/heaped",
+    };
+    ("cloud_field", file)
+}
+
 fn of_sky(params: &Params, quality: &Quality) -> Specialization {
     let on = |on: bool| f64::from(u8::from(on));
     let light = &params.light;
@@ -76,7 +85,7 @@ fn of_sky(params: &Params, quality: &Quality) -> Specialization {
             ("WEATHER_NOISE", f64::from(WeatherNoise::WorleyPerlin as u32)),
             ("HIGH_LOW_SUN", 0.0),
         ],
-        vec![light_model(light.model)],
+        vec![light_model(light.model), cloud_field(params.clouds.field)],
     )
 }
 

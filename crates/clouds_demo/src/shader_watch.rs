@@ -34,7 +34,7 @@ impl ShaderWatch {
 }
 
 fn last_modified(folder: &Path) -> Option<SystemTime> {
-    let folders = [folder.to_path_buf(), folder.join("passes"), folder.join("light_models")];
+    let folders = [folder.to_path_buf(), folder.join("passes"), folder.join("light_models"), folder.join("fields")];
     let files = folders.into_iter().filter_map(|folder| folder.read_dir().ok());
     files.flatten().filter_map(|file| file.ok()?.metadata().ok()?.modified().ok()).max()
 }

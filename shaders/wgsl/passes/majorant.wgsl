@@ -61,7 +61,7 @@ fn majorant_weather(@builtin(global_invocation_id) id: vec3u) {
         (altitudes.y - base) / (cloud_top(driest.precipitation) - base),
     );
     let profile = largest_profile(heights, vec2f(driest.kind, wettest.kind), tower(wettest.precipitation));
-    var bound = with_coverage(profile, wettest.coverage);
+    var bound = bound_of(profile, wettest.coverage);
     if RAINY {
         // The anvil lies at the top. Its rise and its fall are each thicker than a cell, and the full anvil includes a
         // height of 0.84.

@@ -272,7 +272,7 @@ fn steps_to_next(steps: Steps, direction: vec3f, column: WeatherSample, noise: f
     }
     let leaps = ray_leaps(direction, column.medium);
     // Distances on the chart: noise and coverage have the same slope everywhere on it.
-    let lacks = 1.0 - column.coverage - noise * vec2f(1.0, column.profile);
+    let lacks = lacks_of(column, noise);
     var way = leaps.reach * max(lacks.x, lacks.y / leaps.rise);
     if KEEP_CLEAR {
         way = min(way, way_to_rim(at));

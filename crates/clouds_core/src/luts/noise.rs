@@ -31,9 +31,12 @@ pub(crate) struct Noises {
 /// Latest noise textures of a device: renderers of the same seed share them.
 type Shared = Mutex<Option<Arc<Noise>>>;
 
+type Key = (u32, params::Noise, params::Field);
+
 /// Baked noise textures.
 struct Noise {
-    key: (u32, params::Noise),
+    key: Key,
+    /// Weight of the finer detail; of the field `heaped`, 0.
     finer: f32,
     shape: wgpu::TextureView,
     /// Detail noise without finer detail.
@@ -48,15 +51,19 @@ impl Noises {
     /// Binds the noise of the parameters: that of this renderer, or the latest of the device, or a new one.
     pub fn update(&mut self, rec: &mut Recorder<'_>, inputs: &Inputs<'_>) -> Result<()> {
         let clouds = &inputs.params.clouds;
-        let key = (clouds.seed, clouds.noise);
+        let heaped = clouds.field == params::Field::Heaped;
+        // The field `heaped` has noises of its own.
+        let kind = if heaped { params::Noise::Nubis2015 } else { clouds.noise };
+        let finer = if heaped { 0.0 } else { clouds.fine_detail };
+        let key = (clouds.seed, kind, clouds.field);
         let shared = rec.gpu.common::<Shared>();
         let mut shared = lock(&shared);
         let matches_key = |noise: &Arc<Noise>| noise.key == key && rec.has(&noise.token);
         let baked: Vec<_> = self.own.clone().into_iter().chain(shared.clone()).filter(matches_key).collect();
-        let noise = match baked.iter().find(|noise| noise.finer == clouds.fine_detail) {
+        let noise = match baked.iter().find(|noise| noise.finer == finer) {
             Some(noise) => noise.clone(),
             None => {
-                let noise = Arc::new(Noise::new(rec, key, clouds.fine_detail, baked.first().map(|noise| &**noise))?);
+                let noise = Arc::new(Noise::new(rec, key, finer, baked.first().map(|noise| &**noise))?);
                 *shared = Some(noise.clone());
                 noise
             }
@@ -73,7 +80,8 @@ impl Noises {
 
 impl Noise {
     /// Bakes noise textures; those that match are taken from `other`, which has the same seed.
-    fn new(rec: &mut Recorder<'_>, key: (u32, params::Noise), finer: f32, other: Option<&Self>) -> Result<Self> {
+    fn new(rec: &mut Recorder<'_>, key: Key, finer: f32, other: Option<&Self>) -> Result<Self> {
+        let heaped = key.2 == params::Field::Heaped;
         let (shape, coarse, curl) = match other {
             Some(noise) => (noise.shape.clone(), noise.coarse.clone(), noise.curl.clone()),
             None => {
@@ -81,7 +89,7 @@ impl Noise {
                     .map(|(label, size)| volume(rec.gpu, label, size, 1));
                 let curl = rec.gpu.flat("curl", [CURL_SIZE; 2], wgpu::TextureFormat::Rg16Float);
                 load_or_bake(rec, "noise", "noise", &format!("{key:?}"), &[&shape, &coarse, &curl], |rec| {
-                    bake_volume(rec, "shape", vec![], &shape);
+                    bake_volume(rec, if heaped { "heaped_shape" } else { "shape" }, vec![], &shape);
                     bake_volume(rec, "detail", vec![], &coarse);
                     bake_curl(rec, &curl);
                 })?;
@@ -92,7 +100,8 @@ impl Noise {
         // detail, and the picture would jump by 1 to 4 % between no finer detail and any.
         let detail = volume(rec.gpu, "finer_detail", FINER * DETAIL_SIZE, (FINER * DETAIL_SIZE).ilog2() + 1);
         load_or_bake(rec, "noise", "finer_detail", &format!("{key:?} {finer}"), &[&detail], |rec| {
-            bake_volume(rec, "finer_detail", vec![("volume_in", (&view(&coarse)).into())], &detail);
+            let reads = if heaped { vec![] } else { vec![("volume_in", (&view(&coarse)).into())] };
+            bake_volume(rec, if heaped { "heaped_relief" } else { "finer_detail" }, reads, &detail);
         })?;
         Ok(Self { key, finer, shape, coarse, detail: view(&detail), curl, token: rec.token() })
     }

@@ -2,6 +2,7 @@
 // (nubis2015, "density sampler").
 #import math
 #import bindings
+#import density
 
 // Part of the rain that raises coverage: to at least 0.7 in nubis2015, here to 0.95, as towers have holes otherwise.
 const WET = 0.95;

@@ -1,10 +1,11 @@
 // Field `heaped`: a shape that behaves like a distance, with relief of five octaves and a narrow edge. Its slope is
 // about the same everywhere, so that what is subtracted from it moves the surface by as many metres.
 //
-// Noise and profile are added, not multiplied: where the profile falls slowly the noise makes turrets. Near the base the
-// noise is read nearly upright, and thick cloud hangs lower, so that clouds stand on bases that undulate.
+// Noise and profile are added, not multiplied: where the profile falls slowly the noise makes turrets. Near the base
+// the noise is read nearly upright, and thick cloud hangs lower, so that clouds stand on bases that undulate.
 #import math
 #import bindings
+#import density
 
 // Part of the rain that raises coverage.
 const WET = 1.25;

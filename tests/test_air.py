@@ -354,7 +354,7 @@ def test_methods_agree_in_air():
 def share(height, changes):
     params = nubis.Params().with_(**{"clouds.type": 0.5, "weather.type_variety": 0.0, **changes})
     base, top = params.clouds.base, params.clouds.top
-    column = "WeatherSample(1.0, 1.0, 1.0, x.x, 0.0, vec3f(0.0), CLOUD, x.y, x.x)"
+    column = "WeatherSample(1.0, 1.0, 1.0, x.x, 0.0, vec3f(0.0), CLOUD, x.y, x.x, 0.0, 0.0)"
     at = [[h, top - base] for h in np.atleast_1d(height)]
     return probe(f"ambient_share({column})", at, imports=["ambient"], params=params)[:, 0]
 

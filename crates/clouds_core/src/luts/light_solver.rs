@@ -2,8 +2,9 @@
 //! cells (multigrid).
 //!
 //! A sweep alone moves light by a mean free path: a storm would need thousands. After one cycle, begun with the light of
-//! the level around it, a level is 1 to 8 % from its converged solution (`tests/test_light_field.py`). Visiting the wider
-//! grids twice in a cycle (W-cycle) leaves a third of the error in a homogeneous slab, and in skies 0.9 of it.
+//! the level around it, a level is 1 to 8 % from its converged solution (`tests/test_light_field.py`). W-cycles, which visit
+//! the wider grids twice, solve a slab of optical depth 80 in two cycles instead of eight, and leave 0.9 of the error of
+//! skies for 1.6 times the time.
 
 use glam::{DVec2, DVec3};
 
